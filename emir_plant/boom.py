@@ -1,0 +1,117 @@
+"""The elastic boom: rigid sections joined by bending springs, reduced to a few modes.
+
+Paper 2.1, Fig. 2: five arms of four sections, three springs in each arm, arms joined rigidly.
+The absolute rotations of the sections are the coordinates; deflections are small against a
+frame that turns with the boom.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from emir_plant.parameters import GRAVITY, Geometry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SectionModel:
+    """The boom before reduction; n coordinates theta, rad, the first at the joint.
+
+    mass: (n, n) kg m^2. stiffness: (n, n) N m/rad. weight: (n,) N m, generalised gravity of the
+    horizontal boom. tip: (n,) m, transverse displacement of the TCP per rotation.
+    """
+
+    mass: Array
+    stiffness: Array
+    weight: Array
+    tip: Array
+
+
+@dataclass(frozen=True)
+class BoomModes:
+    """The m lowest modes, mass-normalised, the rigid one first.
+
+    frequency: (m,) rad/s, without the factor `modal_frequency`.
+    joint, tip_angle: (m,) rotation of the first and the last section per modal coordinate.
+    weight: (m,) generalised gravity of the horizontal boom.
+    deflection: (m,) m, displacement of the TCP off the line of the first section, up positive.
+    residual_sag: m, what the modes left out add to that, horizontal boom at rest.
+    """
+
+    frequency: Array
+    joint: Array
+    tip_angle: Array
+    weight: Array
+    deflection: Array
+    residual_sag: float
+
+
+def section_model(geometry: Geometry) -> SectionModel:
+    """Assemble mass, stiffness and gravity of the section chain (paper Fig. 2)."""
+    sections = geometry.arms * geometry.sections_per_arm
+    length = geometry.boom_length / sections
+    mass = geometry.boom_mass / sections
+    centres = length * (np.tril(np.ones((sections, sections)), -1) + 0.5 * np.eye(sections))
+    tip = np.full(sections, length)
+    springs = np.zeros((sections, sections))
+    for k in range(sections - 1):
+        bend = np.zeros(sections)
+        bend[k : k + 2] = (-1.0, 1.0)
+        springs += geometry.section_spring * np.outer(bend, bend)
+    inertia = mass * centres.T @ centres + mass * length**2 / 12.0 * np.eye(sections)
+    inertia += geometry.payload * np.outer(tip, tip)
+    weight = GRAVITY * (mass * centres.sum(axis=0) + geometry.payload * tip)
+    join = _rigid_arm_joints(geometry)
+    return SectionModel(join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join)
+
+
+def _rigid_arm_joints(geometry: Geometry) -> Array:
+    """Return (sections, n): the last section of an arm turns with the first of the next."""
+    sections = geometry.arms * geometry.sections_per_arm
+    starts_arm = np.arange(sections) % geometry.sections_per_arm == 0
+    coordinate = np.arange(sections) - np.cumsum(starts_arm) + 1
+    join = np.zeros((sections, coordinate[-1] + 1))
+    join[np.arange(sections), coordinate] = 1.0
+    return join
+
+
+def boom_modes(geometry: Geometry) -> BoomModes:
+    """Reduce the section model to its `modes_kept` lowest modes.
+
+    Raises ValueError when there are fewer coordinates than modes to keep.
+    """
+    model = section_model(geometry)
+    kept = geometry.modes_kept
+    if kept > len(model.weight):
+        raise ValueError(f"modes_kept = {kept}: the boom has only {len(model.weight)} modes")
+    squares, shapes = eigh(model.stiffness, model.mass)
+    shapes = shapes * np.sign(model.tip @ shapes)  # up positive
+    line = np.zeros_like(model.tip)
+    line[0] = model.tip.sum()
+    deflection = (model.tip - line) @ shapes
+    static = _static_deflections(squares, shapes, deflection, model.weight)
+    return BoomModes(
+        frequency=np.sqrt(np.clip(squares[:kept], 0.0, None)) * (np.arange(kept) > 0),
+        joint=shapes[0, :kept],
+        tip_angle=shapes[-1, :kept],
+        weight=shapes[:, :kept].T @ model.weight,
+        deflection=deflection[:kept],
+        residual_sag=float(static[kept:].sum()),
+    )
+
+
+def _static_deflections(squares: Array, shapes: Array, deflection: Array, weight: Array) -> Array:
+    """Return each mode's part of the TCP's static deflection, m, horizontal boom.
+
+    The joint torque that carries the weight acts on the first section; together they leave the
+    rigid mode (index 0) at rest.
+    """
+    load = -(shapes.T @ weight)
+    torque = -load[0] / shapes[0, 0]
+    load += torque * shapes[0]
+    parts = np.zeros_like(load)
+    parts[1:] = deflection[1:] * load[1:] / squares[1:]
+    return parts

@@ -1,0 +1,30 @@
+"""Dry friction of the piston's seals, the same at every speed."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+from emir_plant.quantity import quantity
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """Force against the motion of the piston: F_c tanh(v / v_0)."""
+
+    balance: ClassVar[Balance] = "force"
+    size: ClassVar[str] = "force"
+    source: ClassVar[str] = "seal friction, 1-3 % of the load"
+    trial: ClassVar[dict[str, float]] = {"force": 3e3}
+
+    force: float = quantity("N", 0.0, 1e5, "F_c", default=0.0)
+    smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
+
+
+@compiled
+def friction(velocity: float, p: Any) -> float:
+    """Return the friction force on the piston, N; it has the sign of the velocity, m/s."""
+    if p.coulomb_friction_force == 0.0:
+        return 0.0
+    return p.coulomb_friction_force * math.tanh(velocity / p.coulomb_friction_smoothing_speed)

@@ -1,0 +1,26 @@
+"""Oil that passes the piston from one chamber to the other."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+from emir_plant.quantity import quantity
+
+
+@dataclass(frozen=True)
+class InternalLeakage(Effect):
+    """Laminar flow C_i (p_H - p_S) out of the lifting into the lowering chamber."""
+
+    balance: ClassVar[Balance] = "chambers"
+    size: ClassVar[str] = "coefficient"
+    source: ClassVar[str] = "piston leakage 1e-13 ... 5e-12 m^3/(s Pa)"
+    trial: ClassVar[dict[str, float]] = {"coefficient": 1e-12}
+
+    coefficient: float = quantity("m^3/(s Pa)", 0.0, 1e-9, "C_i", default=0.0)
+
+
+@compiled
+def flow(pressure_lifting: float, pressure_lowering: float, p: Any) -> float:
+    """Return the flow from the lifting to the lowering chamber, m^3/s; pressures in Pa."""
+    return p.internal_leakage_coefficient * (pressure_lifting - pressure_lowering)

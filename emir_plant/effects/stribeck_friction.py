@@ -1,0 +1,34 @@
+"""Dry friction of the piston's seals that is largest at breakaway and falls with speed."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+from emir_plant.quantity import quantity
+
+
+@dataclass(frozen=True)
+class StribeckFriction(Effect):
+    """Force against the motion: tanh(v/v_0) F_c [1 + (b - 1) exp(-(v/v_s)^2)]."""
+
+    balance: ClassVar[Balance] = "force"
+    size: ClassVar[str] = "force"
+    source: ClassVar[str] = "breakaway 1.3 times the sliding force, v_s 5-10 mm/s"
+    trial: ClassVar[dict[str, float]] = {"force": 3e3, "breakaway": 1.5, "stribeck_speed": 7e-3}
+
+    force: float = quantity("N", 0.0, 1e5, "F_c, while sliding fast", default=0.0)
+    breakaway: float = quantity("1", 1.0, 5.0, "F_s / F_c", default=1.3)
+    stribeck_speed: float = quantity("m/s", 1e-4, 0.2, "v_s", default=7e-3)
+    smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
+
+
+@compiled
+def friction(velocity: float, p: Any) -> float:
+    """Return the friction force on the piston, N; it has the sign of the velocity, m/s."""
+    if p.stribeck_friction_force == 0.0:
+        return 0.0
+    hump = math.exp(-((velocity / p.stribeck_friction_stribeck_speed) ** 2))
+    level = p.stribeck_friction_force * (1.0 + (p.stribeck_friction_breakaway - 1.0) * hump)
+    return level * math.tanh(velocity / p.stribeck_friction_smoothing_speed)

@@ -1,0 +1,17 @@
+"""Turbulent flow through resistances in series."""
+
+import math
+
+from emir_plant.jit import compiled
+
+LAMINAR_BELOW = 1e5  # Pa: below this drop the square root turns into a straight line
+
+
+@compiled
+def turbulent_flow(drop: float, conductance: float) -> float:
+    """Return the flow, m^3/s, that a pressure drop, Pa, drives.
+
+    dp = k Q|Q| with conductance = 1/sqrt(k), m^3/(s sqrt(Pa)); made laminar near dp = 0, where
+    the square root's slope would be infinite: Q = c dp / (dp^2 + (1 bar)^2)^(1/4).
+    """
+    return conductance * drop / math.sqrt(math.sqrt(drop * drop + LAMINAR_BELOW * LAMINAR_BELOW))

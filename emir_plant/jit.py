@@ -1,0 +1,39 @@
+"""Compilation of the numerical core, and a cache of it that cannot go stale.
+
+numba's own cache watches only the file a function stands in. The core is spread over several
+files (one effect, one file), so the cache folder carries a digest of all of them.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _cache_folder() -> Path:
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.read_bytes())
+    user_cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    root = Path(os.environ.get("NUMBA_CACHE_DIR", user_cache / "emir"))
+    return root / digest.hexdigest()[:16]
+
+
+numba.config.CACHE_DIR = str(_cache_folder())
+
+
+def compiled(function: Function) -> Function:
+    """Compile `function` with numba: IEEE arithmetic, cached on disk."""
+    result: Function = numba.njit(cache=True, error_model="numpy")(function)
+    return result
+
+
+def compiled_parallel(function: Function) -> Function:
+    """As `compiled`, with the loops written as `numba.prange` run on all cores."""
+    result: Function = numba.njit(cache=True, error_model="numpy", parallel=True)(function)
+    return result

@@ -1,0 +1,48 @@
+"""Linear models of the machine about an operating point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from emir_plant.core import Array, Truth
+from emir_plant.plant import Plant
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """dx = A x + B u, y = C x, deviations from the operating point.
+
+    A: (n, n). B: (n, 1), input y2. C: (len(Truth), n), rows in the order of `Truth`.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+
+    def modes(self) -> tuple[Array, Array]:
+        """Return frequency, Hz, and damping, of critical, of the oscillations, slowest first."""
+        poles = np.linalg.eigvals(self.A)
+        poles = poles[poles.imag > 1e-6]
+        poles = poles[np.argsort(abs(poles))]
+        return abs(poles) / (2.0 * np.pi), -poles.real / abs(poles)
+
+
+def linearize(plant: Plant, state: Array, command: float = 0.0) -> LinearModel:
+    """Return the linear model about a state and command, by central differences."""
+
+    def outputs(x: Array) -> Array:
+        return np.array(plant.outputs(x))
+
+    steps = 1e-6 * np.maximum(np.abs(state), 1e-3)
+    A = np.empty((state.size, state.size))
+    C = np.empty((len(Truth._fields), state.size))
+    for k, step in enumerate(steps):
+        ahead, behind = state.copy(), state.copy()
+        ahead[k] += step
+        behind[k] -= step
+        width = ahead[k] - behind[k]
+        A[:, k] = (plant.derivative(ahead, command) - plant.derivative(behind, command)) / width
+        C[:, k] = (outputs(ahead) - outputs(behind)) / width
+    d = 1e-6
+    B = (plant.derivative(state, command + d) - plant.derivative(state, command - d)) / (2.0 * d)
+    return LinearModel(A, B.reshape(-1, 1), C)

@@ -1,0 +1,38 @@
+"""Joint 1's triangle: piston stroke against boom angle. Every sign convention lives here.
+
+Stroke h grows when the boom is lifted, h = 0 at alpha = 0 (horizontal). F > 0 pushes the boom
+up; the joint torque is F r with r = dh/dalpha > 0. Paper equation (1), with its factor 1/r.
+"""
+
+import math
+from typing import Any
+
+from emir_plant.jit import compiled
+
+
+@compiled
+def cylinder_length(angle: float, p: Any) -> float:
+    """Return the distance from cylinder foot to rod eye, m, at the boom angle, rad."""
+    a, b = p.triangle_a, p.triangle_b
+    return math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(angle + p.triangle_gamma0))
+
+
+@compiled
+def stroke(angle: float, p: Any) -> float:
+    """Return the piston stroke h, m, at the boom angle, rad."""
+    return cylinder_length(angle, p) - cylinder_length(0.0, p)
+
+
+@compiled
+def lever_arm(angle: float, p: Any) -> float:
+    """Return r = dh/dalpha, m, at the boom angle, rad."""
+    sine = math.sin(angle + p.triangle_gamma0)
+    return p.triangle_a * p.triangle_b * sine / cylinder_length(angle, p)
+
+
+@compiled
+def angle(stroke: float, p: Any) -> float:
+    """Return the boom angle, rad, at the piston stroke, m."""
+    a, b = p.triangle_a, p.triangle_b
+    length = cylinder_length(0.0, p) + stroke
+    return math.acos((a * a + b * b - length * length) / (2.0 * a * b)) - p.triangle_gamma0

@@ -1,0 +1,159 @@
+"""The machine's parameters: frozen dataclasses, SI units, every field with unit and range.
+
+The values stand in YAML files (data/joint1.yaml, or a maker's data sheet); see `sheet.py`.
+Group and field names are those of the data sheet.
+"""
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from emir_plant.effects import Effects
+from emir_plant.quantity import ParameterError, Quantity, check_ranges, quantities, quantity
+
+GRAVITY = 9.81  # m/s^2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Geometry:
+    """Boom, payload and the cylinder triangle of joint 1 (paper 2.1, Fig. 2, 3)."""
+
+    boom_length: float = quantity("m", 1.0, 100.0, "joint 1 to TCP, stretched")
+    boom_mass: float = quantity("kg", 10.0, 1e5, "uniform along the boom")
+    section_spring: float = quantity("N m/rad", 1e5, 1e12, "bending spring between sections")
+    triangle_a: float = quantity("m", 0.05, 20.0, "joint to cylinder foot")
+    triangle_b: float = quantity("m", 0.05, 20.0, "joint to rod eye")
+    triangle_gamma0: float = quantity("rad", 0.0, 3.1, "angle foot-joint-rod eye at alpha = 0")
+    arms: int = quantity("1", 1, 20, "elastic arms, joined rigidly", default=5)
+    sections_per_arm: int = quantity("1", 2, 20, "rigid sections of an arm", default=4)
+    modes_kept: int = quantity("1", 2, 16, "rigid mode and bending modes", default=5)
+    modal_damping: float = quantity("1", 0.0, 0.5, "of critical, bending modes", default=0.01)
+    modal_frequency: float = quantity("1", 0.5, 2.0, "factor on bending frequencies", default=1.0)
+    payload: float = quantity("kg", 0.0, 3000.0, "point mass at the TCP", default=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """Piston areas and chambers, paper equations (5)-(8)."""
+
+    area_lifting: float = quantity("m^2", 1e-5, 1.0, "A_H")
+    area_lowering: float = quantity("m^2", 1e-5, 1.0, "A_S")
+    volume_lifting_0: float = quantity("m^3", 1e-5, 1.0, "V_H0, at h = 0, lines included")
+    volume_lowering_0: float = quantity("m^3", 1e-5, 1.0, "V_S0, at h = 0, lines included")
+    beta: float = quantity("Pa", 1e7, 3e9, "stiffness of oil and vessels together")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supply:
+    """Pump and tank."""
+
+    p0: float = quantity("Pa", 1e6, 5e7, "pump pressure, absolute")
+    pT: float = quantity("Pa", 0.0, 5e6, "tank pressure, absolute")  # noqa: N815 (paper's name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Valve:
+    """Proportional 4/3 solenoid valve with pressure balance, paper 2.2."""
+
+    flow_nominal: float = quantity("m^3/s", 1e-6, 0.1, "Q_n, into the lifting chamber, fully open")
+    flow_ratio_lowering: float = quantity("1", 0.01, 5.0, "pump flow when lowering / Q_n")
+    natural_frequency: float = quantity("rad/s", 10.0, 2000.0, "of the spool")
+    balance_pressure: float = quantity("Pa", 1e5, 5e6, "drop held over the metering edge")
+    dead_zone: float = quantity("1", 0.0, 0.5, "overlap as a share of full stroke", default=0.10)
+    damping: float = quantity("1", 0.05, 5.0, "of critical, of the spool", default=0.8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resistances:
+    """Turbulent resistances dp = k Q|Q| of pump line, valve, logic block, return line (Fig. 4)."""
+
+    k_pump_line: float = quantity("Pa s^2/m^6", 1e6, 1e16, "pump to valve")
+    k_block_in: float = quantity("Pa s^2/m^6", 1e6, 1e16, "logic block, into the chamber")
+    k_return_line: float = quantity("Pa s^2/m^6", 1e6, 1e16, "valve to tank")
+    k_block_out: float = quantity("Pa s^2/m^6", 1e6, 1e16, "logic block, out; over y4^2")
+    k_meter_out_lifting: float = quantity("Pa s^2/m^6", 1e6, 1e16, "return edge; over o^2")
+    k_meter_out_lowering: float = quantity("Pa s^2/m^6", 1e6, 1e16, "return edge; over o^2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogicBlock:
+    """Safety logic block: stops the oil leaving the lifting chamber at low pressure."""
+
+    threshold: float = quantity("Pa", 0.0, 5e7, "opens while p_H is above")
+    time_constant_opening: float = quantity("s", 1e-3, 1.0, "very fast")
+    time_constant_closing: float = quantity("s", 1e-3, 5.0, "slow")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """Resolver, pressure transducers and strain gauge."""
+
+    resolver_bits: int = quantity("1", 4, 24, "resolution of the joint resolver", default=12)
+    resolver_span: float = quantity("rad", 0.1, 6.2832, "angle of the full count")
+    pressure_noise: float = quantity("Pa", 0.0, 1e6, "standard deviation")
+    deflection_noise: float = quantity("rad", 0.0, 1e-2, "standard deviation")
+    seed: int = quantity("1", 0, 2**31 - 1, "of the noise", default=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """All parameters of EMIR's main joint.
+
+    Raises ParameterError, with group and field named, when a value is outside its range.
+    """
+
+    geometry: Geometry
+    cylinder: Cylinder
+    supply: Supply
+    valve: Valve
+    resistances: Resistances
+    logic_block: LogicBlock
+    sensors: Sensors
+    effects: Effects = field(default_factory=Effects)
+
+    def __post_init__(self) -> None:
+        for path, group in groups(self).items():
+            check_ranges(group, path + ".")
+
+
+def groups(machine: Machine) -> dict[str, Any]:
+    """Return the parameter groups by dotted path, each effect being a group."""
+    found = {f.name: getattr(machine, f.name) for f in dataclasses.fields(machine)}
+    effects = found.pop("effects")
+    for effect in dataclasses.fields(effects):
+        found[f"effects.{effect.name}"] = getattr(effects, effect.name)
+    return found
+
+
+def declared(machine: Machine) -> dict[str, tuple[Quantity, float]]:
+    """Return every parameter by dotted path, as (quantity, value)."""
+    return {
+        f"{path}.{name}": (about, getattr(group, name))
+        for path, group in groups(machine).items()
+        for name, about in quantities(group).items()
+    }
+
+
+def with_values(machine: Machine, values: dict[str, float]) -> Machine:
+    """Return the machine with some parameters replaced, given by dotted path.
+
+    Raises ParameterError for a path that does not exist or a value out of range.
+    """
+    result = machine
+    for path, value in values.items():
+        result = _replaced(result, path.split("."), value, path)
+    return result
+
+
+def _replaced(group: Any, keys: list[str], value: float, path: str) -> Any:
+    name, *rest = keys
+    if not dataclasses.is_dataclass(group) or not hasattr(group, name):
+        raise ParameterError(f"{path}: there is no such parameter")
+    if rest:
+        new = _replaced(getattr(group, name), rest, value, path)
+    elif name not in quantities(group):
+        raise ParameterError(f"{path}: there is no such parameter")
+    else:
+        quantities(group)[name].check(path, value)
+        new = int(value) if isinstance(getattr(group, name), int) else float(value)
+    return dataclasses.replace(group, **{name: new})

@@ -1,0 +1,85 @@
+"""EMIR's main joint as an object: frozen parameters, run state in and out."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_plant import core, linkage
+from emir_plant.core import Array, Truth
+from emir_plant.parameters import Machine
+from emir_plant.record import record
+
+
+class SimulationError(RuntimeError):
+    """The simulation left the range in which the model means anything."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """The integrated model of paper 2.3, Fig. 6, boom stretched, joints 2-5 locked.
+
+    The state is a float array (5 + 2 m,): pressures, spool, logic block, modal coordinates and
+    rates (indices in `core.py`). The one input is the valve command y2 in [-1, 1].
+    """
+
+    machine: Machine
+
+    @cached_property
+    def record(self) -> NDArray[Any]:
+        """The parameters as the compiled core reads them, shape (1,)."""
+        return record(self.machine)
+
+    def initial(self, angle: float, pressure_lowering: float | None = None) -> Array:
+        """Return the state at rest, both chambers shut, at the boom angle, rad.
+
+        pressure_lowering: p_S, Pa, the tank's when not given; p_H follows from the balance of
+        forces. Raises SimulationError where the cylinder cannot hold the boom.
+        """
+        p = self.record[0]
+        low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
+        gravity = math.cos(angle)
+        torque = gravity * p["mode_weight"][0] / p["mode_joint"][0]
+        force = torque / linkage.lever_arm(angle, p)
+        high = (force + low * p["area_lowering"]) / p["area_lifting"]
+        if not 0.0 <= high <= p["p0"]:
+            raise SimulationError(
+                f"at {math.degrees(angle):.1f} deg the boom needs {high / 1e5:.0f} bar to rest on,"
+                f" the pump gives 0 ... {p['p0'] / 1e5:.0f}"
+            )
+        modes = p["mode_joint"].size
+        x = np.zeros(core.MODES + 2 * modes)
+        x[core.P_H], x[core.P_S] = high, low
+        x[core.LOGIC] = 1.0 if high > p["threshold"] else 0.0
+        position = x[core.MODES : core.MODES + modes]
+        load = p["mode_joint"] * torque - p["mode_weight"] * gravity
+        position[1:] = load[1:] / p["mode_stiffness"][1:]
+        position[0] = (angle - p["mode_joint"][1:] @ position[1:]) / p["mode_joint"][0]
+        return x
+
+    def derivative(self, state: Array, command: float) -> Array:
+        """Return dx/dt, same shape as the state."""
+        return core.derivative(state, command, self.record)
+
+    def outputs(self, state: Array) -> Truth:
+        """Return what an ideal observer would read off the state."""
+        return core.truth(state, self.record)
+
+    def step(self, state: Array, command: float, dt: float) -> tuple[Array, Truth]:
+        """Return the state after dt, s, under a constant command, and what it shows.
+
+        The command is limited to [-1, 1]. Raises SimulationError when the state is not finite.
+        """
+        after = core.advance(state, min(max(command, -1.0), 1.0), dt, self.record)
+        shown = core.truth(after, self.record)
+        if not math.isfinite(shown.force + shown.stroke + shown.velocity):
+            raise SimulationError(f"the state is not finite after a step with y2 = {command!r}")
+        return after, shown
+
+    def simulate(self, state: Array, commands: Array, dt: float, every: int = 1) -> Array:
+        """Return the truth, (1 + k // every, 12), over k commands, each held for dt, s."""
+        return core.simulate(state, np.clip(commands, -1.0, 1.0), dt, every, self.record)
+

@@ -1,0 +1,60 @@
+"""Declaring a physical parameter: unit, range and meaning, once, beside its name."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+
+class ParameterError(ValueError):
+    """A parameter is missing, unknown or outside its range; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is known about a parameter beside its value.
+
+    unit: SI unit, "1" when dimensionless. low, high: the closed range of admissible values.
+    """
+
+    unit: str
+    low: float
+    high: float
+    meaning: str
+
+    def check(self, name: str, value: float) -> None:
+        """Raise ParameterError unless `value` is a finite number inside the range."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ParameterError(f"{name} = {value!r}: not a number")
+        if not math.isfinite(value) or not self.low <= value <= self.high:
+            raise ParameterError(
+                f"{name} = {value:g}: outside {self.low:g} ... {self.high:g} {self.unit}"
+            )
+
+
+def quantity(
+    unit: str,
+    low: float,
+    high: float,
+    meaning: str,
+    default: Any = dataclasses.MISSING,
+) -> Any:
+    """Declare a field of a parameter dataclass, with its unit, range and meaning."""
+    return dataclasses.field(
+        default=default, metadata={"quantity": Quantity(unit, low, high, meaning)}
+    )
+
+
+def quantities(group: Any) -> dict[str, Quantity]:
+    """Return the declared quantities of a parameter dataclass (class or instance) by name."""
+    return {
+        field.name: field.metadata["quantity"]
+        for field in dataclasses.fields(group)
+        if "quantity" in field.metadata
+    }
+
+
+def check_ranges(group: Any, prefix: str = "") -> None:
+    """Raise ParameterError if a field of the dataclass instance is outside its range."""
+    for name, declared in quantities(group).items():
+        declared.check(prefix + name, getattr(group, name))

@@ -1,0 +1,118 @@
+"""Reading a machine from YAML: its own file or a maker's data sheet, value by value.
+
+An entry is `name: {value, unit, source, tol}`. `tol` is the maker's relative tolerance; an
+entry with a tolerance and no value stands for a factor of 1. Entries may be grouped as a map
+of plain numbers (`resolver: {bits: 12, span: 1.57}` means resolver_bits, resolver_span).
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import yaml
+
+from emir_plant.effects import Effects
+from emir_plant.parameters import Machine
+from emir_plant.quantity import ParameterError, quantities
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A machine as stated: parameters, relative tolerances and sources by dotted path.
+
+    ignored: entries that are no parameter of the machine, such as the recording's rate.
+    """
+
+    machine: Machine
+    tolerances: dict[str, float]
+    sources: dict[str, str]
+    ignored: tuple[str, ...]
+
+
+def joint1() -> Machine:
+    """Return EMIR's main joint as the project states it (data/joint1.yaml)."""
+    return load_sheet(Path(str(files("emir_plant") / "data" / "joint1.yaml")), strict=True).machine
+
+
+def load_sheet(path: Path, strict: bool = False) -> Sheet:
+    """Read a machine from YAML.
+
+    strict: every key has to be known. Raises ParameterError, naming file and key, for a file
+    that cannot be read, a missing or unknown key, another unit, a value outside its range.
+    """
+    try:
+        content = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror}") from None
+    except yaml.YAMLError as error:
+        raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict):
+        raise ParameterError(f"{path}: no parameters in it")
+    try:
+        return _sheet(content, strict)
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def _sheet(content: dict[str, Any], strict: bool) -> Sheet:
+    entries = {
+        f"{group}.{name}": entry
+        for group, members in content.items()
+        if isinstance(members, dict)
+        for name, entry in _entries(members).items()
+    }
+    kinds = {name: kind for name, kind in get_type_hints(Machine).items() if kind is not Effects}
+    known = {f"{g}.{name}": about for g, kind in kinds.items() for name, about in quantities(kind).items()}
+    unknown = tuple(path for path in entries if path not in known)
+    if strict and unknown:
+        raise ParameterError(f"{unknown[0]}: there is no such parameter")
+    values: dict[str, float] = {}
+    for path, about in known.items():
+        entry = entries.get(path)
+        if entry is None:
+            continue
+        if entry.get("unit", about.unit) != about.unit:
+            raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
+        values[path] = _number(entry.get("value", 1.0), path)
+    groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
+    stated = {path: entries[path] for path in values}
+    return Sheet(
+        machine=Machine(**groups),
+        tolerances={path: float(e["tol"]) for path, e in stated.items() if "tol" in e},
+        sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
+        ignored=unknown,
+    )
+
+
+def _number(value: Any, path: str) -> float:
+    # YAML reads 1e-12 (no dot) as text, a trap worth stepping around
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{path} = {value!r}: not a number") from None
+    return int(number) if isinstance(value, int) else number
+
+
+def _entries(members: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the entries of a group, maps of plain numbers spread out."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, entry in members.items():
+        if not isinstance(entry, dict):
+            found[name] = {"value": entry}
+        elif "value" in entry or "tol" in entry:
+            found[name] = entry
+        else:
+            numbers = {key: n for key, n in entry.items() if isinstance(n, int | float)}
+            found |= {f"{name}_{key}": {"value": number} for key, number in numbers.items()}
+    return found
+
+
+def _group(kind: type[Any], name: str, values: dict[str, float]) -> Any:
+    fields = dataclasses.fields(kind)
+    given = {f.name: values[f"{name}.{f.name}"] for f in fields if f"{name}.{f.name}" in values}
+    for f in fields:
+        if f.name not in given and f.default is dataclasses.MISSING:
+            raise ParameterError(f"{name}.{f.name}: missing")
+    return kind(**given)

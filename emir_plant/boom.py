@@ -65,7 +65,9 @@ def section_model(geometry: Geometry) -> SectionModel:
     inertia += geometry.payload * np.outer(tip, tip)
     weight = GRAVITY * (mass * centres.sum(axis=0) + geometry.payload * tip)
     join = _rigid_arm_joints(geometry)
-    return SectionModel(join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join)
+    return SectionModel(
+        join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join
+    )
 
 
 def _rigid_arm_joints(geometry: Geometry) -> Array:

@@ -57,7 +57,11 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
 
     dx = np.empty_like(x)
     dx[P_H] = chambers.pressure_rate(
-        flow_lifting - leak, p.area_lifting * velocity, chambers.volume_lifting(stroke, p), x[P_H], p
+        flow_lifting - leak,
+        p.area_lifting * velocity,
+        chambers.volume_lifting(stroke, p),
+        x[P_H],
+        p,
     )
     dx[P_S] = chambers.pressure_rate(
         flow_lowering + leak,

@@ -8,7 +8,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -24,16 +24,15 @@ def _cache_folder() -> Path:
     return root / digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(_cache_folder())
+numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
 def compiled(function: Function) -> Function:
     """Compile `function` with numba: IEEE arithmetic, cached on disk."""
-    result: Function = numba.njit(cache=True, error_model="numpy")(function)
-    return result
+    return cast("Function", numba.njit(cache=True, error_model="numpy")(function))
 
 
 def compiled_parallel(function: Function) -> Function:
     """As `compiled`, with the loops written as `numba.prange` run on all cores."""
-    result: Function = numba.njit(cache=True, error_model="numpy", parallel=True)(function)
-    return result
+    decorate = numba.njit(cache=True, error_model="numpy", parallel=True)
+    return cast("Function", decorate(function))

@@ -7,6 +7,8 @@ import numpy as np
 from emir_plant.core import Array, Truth
 from emir_plant.plant import Plant
 
+ROUNDING = 1e-6  # rad/s, below which the imaginary part of a pole is numerical noise
+
 
 @dataclass(frozen=True)
 class LinearModel:
@@ -21,10 +23,11 @@ class LinearModel:
 
     def modes(self) -> tuple[Array, Array]:
         """Return frequency, Hz, and damping, of critical, of the oscillations, slowest first."""
-        poles = np.linalg.eigvals(self.A)
-        poles = poles[poles.imag > 1e-6]
+        poles = np.linalg.eigvals(self.A).astype(np.complex128)
+        poles = poles[poles.imag > ROUNDING]
         poles = poles[np.argsort(abs(poles))]
-        return abs(poles) / (2.0 * np.pi), -poles.real / abs(poles)
+        frequency = np.hypot(poles.real, poles.imag)
+        return frequency / (2.0 * np.pi), -poles.real / frequency
 
 
 def linearize(plant: Plant, state: Array, command: float = 0.0) -> LinearModel:

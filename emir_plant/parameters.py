@@ -8,8 +8,8 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
+from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
-from emir_plant.quantity import ParameterError, Quantity, check_ranges, quantities, quantity
 
 GRAVITY = 9.81  # m/s^2
 
@@ -123,37 +123,3 @@ def groups(machine: Machine) -> dict[str, Any]:
     for effect in dataclasses.fields(effects):
         found[f"effects.{effect.name}"] = getattr(effects, effect.name)
     return found
-
-
-def declared(machine: Machine) -> dict[str, tuple[Quantity, float]]:
-    """Return every parameter by dotted path, as (quantity, value)."""
-    return {
-        f"{path}.{name}": (about, getattr(group, name))
-        for path, group in groups(machine).items()
-        for name, about in quantities(group).items()
-    }
-
-
-def with_values(machine: Machine, values: dict[str, float]) -> Machine:
-    """Return the machine with some parameters replaced, given by dotted path.
-
-    Raises ParameterError for a path that does not exist or a value out of range.
-    """
-    result = machine
-    for path, value in values.items():
-        result = _replaced(result, path.split("."), value, path)
-    return result
-
-
-def _replaced(group: Any, keys: list[str], value: float, path: str) -> Any:
-    name, *rest = keys
-    if not dataclasses.is_dataclass(group) or not hasattr(group, name):
-        raise ParameterError(f"{path}: there is no such parameter")
-    if rest:
-        new = _replaced(getattr(group, name), rest, value, path)
-    elif name not in quantities(group):
-        raise ParameterError(f"{path}: there is no such parameter")
-    else:
-        quantities(group)[name].check(path, value)
-        new = int(value) if isinstance(getattr(group, name), int) else float(value)
-    return dataclasses.replace(group, **{name: new})

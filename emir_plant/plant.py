@@ -82,4 +82,3 @@ class Plant:
     def simulate(self, state: Array, commands: Array, dt: float, every: int = 1) -> Array:
         """Return the truth, (1 + k // every, 12), over k commands, each held for dt, s."""
         return core.simulate(state, np.clip(commands, -1.0, 1.0), dt, every, self.record)
-

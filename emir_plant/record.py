@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_common.quantity import quantities
 from emir_plant.boom import BoomModes, boom_modes
 from emir_plant.parameters import Geometry, Machine, groups
-from emir_plant.quantity import quantities
 
 
 def record(machine: Machine) -> NDArray[Any]:
@@ -32,7 +32,7 @@ def _with_effects(machine: Machine) -> Geometry:
 
 
 def _parameters(machine: Machine) -> dict[str, Any]:
-    values = {}
+    values: dict[str, float] = {}
     for path, group in groups(machine).items():
         kind, _, effect = path.partition(".")
         prefix = f"{effect}_" if kind == "effects" else ""

@@ -23,7 +23,7 @@ class Measurement(NamedTuple):
 
 def resolver(angle: float, bits: int, span: float) -> float:
     """Return the angle, rad, rounded to the nearest of 2^bits steps of the span, rad."""
-    step = span / 2**bits
+    step = span / 2.0**bits
     return math.floor(angle / step + 0.5) * step
 
 

@@ -13,9 +13,9 @@ from typing import Any, get_type_hints
 
 import yaml
 
+from emir_common.quantity import ParameterError, quantities
 from emir_plant.effects import Effects
 from emir_plant.parameters import Machine
-from emir_plant.quantity import ParameterError, quantities
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def joint1() -> Machine:
     return load_sheet(Path(str(files("emir_plant") / "data" / "joint1.yaml")), strict=True).machine
 
 
-def load_sheet(path: Path, strict: bool = False) -> Sheet:
+def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     """Read a machine from YAML.
 
     strict: every key has to be known. Raises ParameterError, naming file and key, for a file
@@ -51,12 +51,12 @@ def load_sheet(path: Path, strict: bool = False) -> Sheet:
     if not isinstance(content, dict):
         raise ParameterError(f"{path}: no parameters in it")
     try:
-        return _sheet(content, strict)
+        return _sheet(content, strict=strict)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
 
 
-def _sheet(content: dict[str, Any], strict: bool) -> Sheet:
+def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     entries = {
         f"{group}.{name}": entry
         for group, members in content.items()
@@ -64,7 +64,11 @@ def _sheet(content: dict[str, Any], strict: bool) -> Sheet:
         for name, entry in _entries(members).items()
     }
     kinds = {name: kind for name, kind in get_type_hints(Machine).items() if kind is not Effects}
-    known = {f"{g}.{name}": about for g, kind in kinds.items() for name, about in quantities(kind).items()}
+    known = {
+        f"{g}.{name}": about
+        for g, kind in kinds.items()
+        for name, about in quantities(kind).items()
+    }
     unknown = tuple(path for path in entries if path not in known)
     if strict and unknown:
         raise ParameterError(f"{unknown[0]}: there is no such parameter")

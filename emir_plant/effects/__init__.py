@@ -4,7 +4,8 @@
 and its term in `terms.py` (or, for a changed parameter, in `record.py`).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import get_type_hints
 
 from emir_plant.effects.base import Effect
 from emir_plant.effects.coulomb_friction import CoulombFriction
@@ -27,4 +28,4 @@ class Effects:
     entrained_air: EntrainedAir = EntrainedAir()
 
 
-REGISTRY: dict[str, type[Effect]] = {f.name: type(f.default) for f in fields(Effects)}
+REGISTRY: dict[str, type[Effect]] = get_type_hints(Effects)

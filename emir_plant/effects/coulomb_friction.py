@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled
-from emir_plant.quantity import quantity
 
 
 @dataclass(frozen=True)

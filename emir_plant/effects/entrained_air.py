@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled
-from emir_plant.quantity import quantity
 
 ATMOSPHERE = 1e5  # Pa, at which the gas share is stated
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
-from emir_plant.quantity import quantity
 
 
 @dataclass(frozen=True)

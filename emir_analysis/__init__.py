@@ -1,0 +1,1 @@
+"""From recordings to signals, metrics, pictures and what a model lacks; the `emir` command."""

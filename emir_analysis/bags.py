@@ -1,0 +1,144 @@
+"""Reading rosbag2 recordings in MCAP: messages with their times, and what was stored beside."""
+
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Channel, Footer, McapRecord, Metadata, Schema
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+from zstandard import ZstdError
+
+from emir_analysis.errors import InputError
+
+
+class _Stream:
+    """A file that says so when it ends in the middle of a record."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, length: int) -> bytes:
+        data = self._file.read(length)
+        if len(data) < length:
+            raise EndOfFile
+        return data
+
+
+class Message(NamedTuple):
+    """One message of a recording."""
+
+    stamp: int  # ns, of the header; the log time where the message has no header
+    log_time: int  # ns, when it was recorded
+    data: Any  # the decoded message, fields as attributes
+
+
+def read(path: Path, topics: Collection[str] | None = None) -> dict[str, list[Message]]:
+    """Return the messages of a recording by topic, in the order of their log times.
+
+    path: a rosbag2 folder, with or without its metadata.yaml, or one .mcap file. A recording
+    that was cut off is read as far as it goes. topics: all when not given. Raises InputError
+    for a path without a recording, a damaged or empty one and a topic that is not recorded.
+    """
+    found: dict[str, list[Message]] = {}
+    for file in files(path):
+        for topic, message in _messages(file, topics):
+            found.setdefault(topic, []).append(message)
+    if not found and not topics:
+        raise InputError(f"{path}: no message in it")
+    for topic in topics or ():
+        if topic not in found:
+            there = ", ".join(sorted(recorded_topics(path))) or "none"
+            raise InputError(f"{path}: topic {topic} is not recorded; there are: {there}")
+    for messages in found.values():
+        messages.sort(key=lambda message: message.log_time)
+    return found
+
+
+def metadata(path: Path) -> dict[str, dict[str, str]]:
+    """Return the MCAP metadata records of a recording by name. Raises InputError as `read`."""
+    return {
+        record.name: dict(record.metadata)
+        for file in files(path)
+        for record in _records(file)
+        if isinstance(record, Metadata)
+    }
+
+
+def files(path: Path) -> list[Path]:
+    """Return the .mcap files of a recording. Raises InputError when there are none."""
+    if not path.exists():
+        raise InputError(f"{path}: no such recording")
+    found = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    if not found or found[0].suffix != ".mcap":
+        raise InputError(f"{path}: not a recording: no .mcap file")
+    return found
+
+
+def recorded_topics(path: Path) -> set[str]:
+    records = (record for file in files(path) for record in _records(file))
+    return {record.topic for record in records if isinstance(record, Channel)}
+
+
+def _messages(file: Path, topics: Collection[str] | None) -> Iterator[tuple[str, Message]]:
+    factory = DecoderFactory()
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    for record in _records(file):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, McapMessage):
+            channel = channels.get(record.channel_id)
+            if channel is None:
+                raise InputError(f"{file}: damaged: a message of no known topic")
+            if topics is None or channel.topic in topics:
+                data = _decoded(file, channel, schemas.get(channel.schema_id), record, factory)
+                stamp = _header_stamp(data, record.log_time)
+                yield channel.topic, Message(stamp, record.log_time, data)
+
+
+def _decoded(
+    file: Path,
+    channel: Channel,
+    schema: Schema | None,
+    record: McapMessage,
+    factory: DecoderFactory,
+) -> Any:
+    decoder = factory.decoder_for(channel.message_encoding, schema)
+    if decoder is None:
+        raise InputError(f"{file}: topic {channel.topic}: not a ROS 2 message in CDR")
+    try:
+        return decoder(record.data)
+    except (struct.error, ValueError, IndexError) as error:
+        raise InputError(f"{file}: topic {channel.topic}: broken message ({error})") from None
+
+
+def _header_stamp(data: Any, log_time: int) -> int:
+    header = getattr(data, "header", None)
+    if header is None:
+        return log_time
+    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+
+
+def _records(file: Path) -> Iterator[McapRecord]:
+    """Yield the records of a file in their order, up to where it was cut off.
+
+    Read in sequence and not by the index at the end, which a cut-off file does not have.
+    """
+    try:
+        with file.open("rb") as stream:
+            for record in StreamReader(_Stream(stream), validate_crcs=True).records:
+                yield record
+                if isinstance(record, Footer):
+                    return
+    except EndOfFile:
+        return
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
+    except (McapError, ZstdError, struct.error, ValueError, RuntimeError) as error:
+        raise InputError(f"{file}: damaged: {' '.join(str(error).split())}") from None

@@ -1,0 +1,93 @@
+"""The `emir` command."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from emir_analysis.errors import InputError
+from emir_common.quantity import ParameterError
+
+USAGE = """usage: emir COMMAND ...
+
+  run        run the graph of machine and controllers, record it, show its figures
+  analyze    figures and pictures of a recording of the graph
+  diagnose   what a model lacks: the residual of a recording, traced to an effect
+
+`emir COMMAND --help` tells more."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; returns the exit code. Errors of the user are one line each."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    commands: dict[str, Callable[[list[str]], int]] = {
+        "run": _run,
+        "analyze": _analyze,
+        "diagnose": _diagnose,
+    }
+    if not words or words[0] in ("-h", "--help"):
+        print(USAGE)
+        return 0
+    if words[0] not in commands:
+        return _complain("emir", f"{words[0]!r}: the commands are {', '.join(commands)}")
+    try:
+        return commands[words[0]](words[1:])
+    except (InputError, ParameterError) as error:
+        return _complain(f"emir {words[0]}", str(error))
+    except KeyboardInterrupt:
+        return 130
+
+
+def _complain(who: str, message: str) -> int:
+    sys.stderr.write(f"{who}: {message}\n")
+    return 1
+
+
+def _run(words: list[str]) -> int:
+    """Hand over to the one package that knows ROS, in this same process."""
+    if find_spec("rclpy") is None:
+        raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
+    os.execv(sys.executable, [sys.executable, "-m", "emir_ros.run", *words])  # noqa: S606
+
+
+def _analyze(words: list[str]) -> int:
+    from emir_analysis.run_report import analyze, text, write_json, write_report
+
+    parser = argparse.ArgumentParser(prog="emir analyze")
+    parser.add_argument("bag", type=Path, help="a recording of the graph")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    options = parser.parse_args(words)
+    run = analyze(options.bag)
+    print(text(run))
+    if options.json:
+        write_json(run, options.json)
+    if options.html:
+        write_report(run, options.html)
+    return 0
+
+
+def _diagnose(words: list[str]) -> int:
+    from emir_analysis.diagnosis import command, summary
+
+    parser = argparse.ArgumentParser(prog="emir diagnose")
+    parser.add_argument("bag", type=Path, help="the recording to find out from")
+    parser.add_argument("--datasheet", type=Path, required=True, help="YAML of the machine")
+    parser.add_argument("--signals", type=Path, required=True, help="YAML: signal, topic, field")
+    parser.add_argument("--judge", type=Path, metavar="BAG", help="the recording to be judged on")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    o = parser.parse_args(words)
+    diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
+    print(summary(diagnosis))
+    return 0
+
+
+def _progress(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

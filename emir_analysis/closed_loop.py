@@ -1,0 +1,84 @@
+"""The closed loop without ROS: a plain loop over the same objects that the nodes hold.
+
+It is what the graph has to agree with, value for value, when it runs in lock step.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
+from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
+from emir_control.trajectory import AwayAndBack, TrajectoryInputs
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TRUTH
+from emir_plant.plant import Plant
+from emir_plant.sensors import measure
+
+Array = NDArray[np.float64]
+
+TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
+CONTROL_PERIOD = CONTROL_PERIOD_NS * 1e-9
+PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """Machine and conventional control of the piston (paper 3.1, 3.2)."""
+
+    plant: Plant
+    trajectory: AwayAndBack
+    cascade: Cascade = field(default_factory=lambda: Cascade(CascadeParameters()))
+    force_loop: ForceLoop = field(default_factory=lambda: ForceLoop(ForceLoopParameters()))
+
+    def run(self, angle: float, pressure_lowering: float, duration: float) -> dict[str, Array]:
+        """Run from rest at a boom angle, rad, and a lowering pressure, Pa, for a duration, s.
+
+        Returns every signal of the topic table by name: those of the plant with one value each
+        plant period, those of the controllers with one each control period, both ends included.
+        """
+        state = self.plant.initial(angle, pressure_lowering)
+        truth = self.plant.outputs(state)
+        following = cascading = damping = None
+        rows: dict[str, list[float]] = {}
+        last = round(duration / CONTROL_PERIOD) * TICKS
+        for tick in range(last + 1):
+            reading = measure(self.plant, truth, tick)
+            _append(rows, reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True)))
+            if tick % TICKS == 0:
+                here = TrajectoryInputs(reading.stroke)
+                following = following or self.trajectory.initial(here)
+                following, reference = self.trajectory.step(following, here, CONTROL_PERIOD)
+
+                tracking = CascadeInputs(reference, reading.stroke)
+                cascading = cascading or self.cascade.initial(tracking)
+                cascading, wanted = self.cascade.step(cascading, tracking, CONTROL_PERIOD)
+
+                sensed = ForceLoopInputs(
+                    wanted.velocity_command,
+                    0.0,
+                    reading.angle,
+                    reading.pressure_lifting,
+                    reading.pressure_lowering,
+                )
+                damping = damping or self.force_loop.initial(sensed)
+                damping, valve = self.force_loop.step(damping, sensed, CONTROL_PERIOD)
+
+                signals = {
+                    "reference_stroke": reference.stroke,
+                    "reference_velocity": reference.velocity,
+                    "valve_command": valve.valve_command,
+                    "measured_force": valve.force,
+                    "force_feedback": valve.feedback,
+                    "wanted_velocity": valve.velocity,
+                    "saturated": float(valve.saturated),
+                }
+                _append(rows, wanted._asdict() | signals)
+            if tick < last:
+                state, truth = self.plant.step(state, signals["valve_command"], PLANT_PERIOD)
+        return {name: np.array(values) for name, values in rows.items()}
+
+
+def _append(rows: dict[str, list[float]], signals: dict[str, float]) -> None:
+    for name, value in signals.items():
+        rows.setdefault(name, []).append(value)

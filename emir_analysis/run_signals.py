@@ -1,0 +1,59 @@
+"""The signals of a run of the graph, from a recording in any namespace."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_analysis import bags
+from emir_analysis.errors import InputError
+from emir_analysis.signals import Recording, Source, load
+from emir_msgs_py.topics import (
+    CYLINDER_REFERENCE,
+    CYLINDER_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    TRUTH,
+    VALVE_COMMAND,
+    Topic,
+)
+
+NEEDED = (CYLINDER_STATES, CYLINDER_REFERENCE, VALVE_COMMAND, PRESSURE_LIFTING, PRESSURE_LOWERING)
+OPTIONAL = (TRUTH,)  # a real machine has none
+
+Array = NDArray[np.float64]
+
+
+def load_run(path: Path) -> Recording:
+    """Read the signals of a run, by the names of the topic table.
+
+    Raises InputError for a recording that lacks a topic of the graph.
+    """
+    there = bags.recorded_topics(path)
+    sources = {}
+    for topic in (*NEEDED, *OPTIONAL):
+        name = _full_name(topic, there)
+        if name is not None:
+            fields = topic.fields.items()
+            sources |= {signal: Source(name, about.path, about.unit) for signal, about in fields}
+        elif topic in NEEDED:
+            raise InputError(f"{path}: no topic {topic.name}; there are {', '.join(sorted(there))}")
+    return load(path, sources)
+
+
+def _full_name(topic: Topic, there: set[str]) -> str | None:
+    """Return the recorded topic with that relative name, whatever its namespace."""
+    found = [name for name in there if name.endswith(f"/{topic.name}")]
+    return min(found, key=len) if found else None
+
+
+def at(recording: Recording, name: str, times: Array) -> Array:
+    """Return a signal at the given times, s, linear between its samples."""
+    signal = recording[name]
+    return np.interp(times, signal.time, signal.value)
+
+
+def piston(recording: Recording, quantity: str) -> str:
+    """Return the best signal for `stroke`, `pressure_lifting` ...: the true one, if recorded."""
+    true = f"true_{quantity}"
+    return true if true in recording.signals else quantity

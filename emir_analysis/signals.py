@@ -1,0 +1,121 @@
+"""From recorded messages to named signals: time, value, unit."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from emir_analysis import bags
+from emir_analysis.errors import InputError
+
+Array = NDArray[np.float64]
+
+FEWEST_SAMPLES = 2
+
+
+class Source(NamedTuple):
+    """Where a signal stands in a recording; field is a path such as `position[0]`."""
+
+    topic: str
+    field: str
+    unit: str
+
+
+SignalMap = Mapping[str, Source | tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One quantity over time. time: (n,) s from the recording's start, increasing. value: (n,)."""
+
+    name: str
+    time: Array
+    value: Array
+    unit: str
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Signals by name; start_ns: the earliest header stamp among them, ns."""
+
+    signals: dict[str, Signal]
+    start_ns: int
+
+    def __getitem__(self, name: str) -> Signal:
+        return self.signals[name]
+
+
+def load(path: Path, signal_map: SignalMap) -> Recording:
+    """Read the mapped signals of a recording, timed by the stamps in the messages' headers.
+
+    Raises InputError, naming topic and field, for what is missing, no number, not finite, out
+    of order in time or shorter than two samples.
+    """
+    sources = {name: Source(*source) for name, source in signal_map.items()}
+    messages = bags.read(path, {source.topic for source in sources.values()})
+    start = min(recorded[0].stamp for recorded in messages.values())
+    signals = {
+        name: _signal(path, name, source, messages[source.topic], start)
+        for name, source in sources.items()
+    }
+    return Recording(signals, start)
+
+
+def read_signal_map(file: Path) -> dict[str, Source]:
+    """Read a YAML map `name: {topic, field, unit}`. Raises InputError naming file and entry."""
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict) or not content:
+        raise InputError(f"{file}: no signals in it")
+    return {str(name): _source(file, name, entry) for name, entry in content.items()}
+
+
+def _source(file: Path, name: str, entry: Any) -> Source:
+    if not isinstance(entry, dict) or not {"topic", "field", "unit"} <= entry.keys():
+        raise InputError(f"{file}: {name}: needs topic, field and unit")
+    return Source(str(entry["topic"]), str(entry["field"]), str(entry["unit"]))
+
+
+def _signal(
+    path: Path, name: str, source: Source, messages: list[bags.Message], start: int
+) -> Signal:
+    where = f"{path}: {source.topic}"
+    if len(messages) < FEWEST_SAMPLES:
+        raise InputError(f"{where}: {len(messages)} message, too few for a signal")
+    time = np.array([message.stamp - start for message in messages]) * 1e-9
+    behind = np.flatnonzero(np.diff(time) <= 0.0)
+    if behind.size:
+        raise InputError(f"{where}: stamps out of order at {time[behind[0] + 1]:.3f} s")
+    value = _values(messages, source.field, where)
+    bad = np.flatnonzero(~np.isfinite(value))
+    if bad.size:
+        raise InputError(
+            f"{where}: {source.field} is {value[bad[0]]} at {time[bad[0]]:.3f} s"
+            f" ({bad.size} of {value.size} samples)"
+        )
+    return Signal(name, time, value, source.unit)
+
+
+def _values(messages: list[bags.Message], field: str, where: str) -> Array:
+    steps = [int(i) if i else name for name, i in re.findall(r"([A-Za-z_]\w*)|\[(\d+)\]", field)]
+    value = np.empty(len(messages))
+    try:
+        for k, message in enumerate(messages):
+            found = message.data
+            for step in steps:
+                found = found[step] if isinstance(step, int) else getattr(found, step)
+            value[k] = float(found)
+    except (AttributeError, IndexError):
+        raise InputError(f"{where}: message {k} has no field {field}") from None
+    except TypeError:
+        raise InputError(f"{where}: field {field} is not a number") from None
+    return value

@@ -1,0 +1,1 @@
+"""What the machine and its control share: how a parameter is declared and checked."""

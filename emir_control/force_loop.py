@@ -1,0 +1,90 @@
+"""Force feedback: damps the machine without the oil loss of a leakage line (paper 3.1)."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from emir_common.quantity import check_ranges, quantity
+from emir_control.filters import low_pass
+from emir_control.prefilter import PrefilterParameters, piston_velocity, valve_command
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceLoopParameters:
+    """High pass (10) and prefilter.
+
+    The gain is g / k_h with k_h = beta (A_H^2/V_H + A_S^2/V_S), 5.7e7 N/m at 45 deg; the slow
+    mode gets a damping of about g / (2 omega): 8.8e-8 m/(s N) is g = 5 1/s, 0.57 of critical.
+    """
+
+    gain: float = quantity("m/(s N)", 0.0, 1e-5, "k_F", default=8.8e-8)
+    time_constant: float = quantity("s", 0.01, 60.0, "T_H, of the high pass", default=1.0)
+    prefilter: PrefilterParameters = field(default_factory=PrefilterParameters)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+class ForceLoopState(NamedTuple):
+    """The slow part of the force, which the high pass takes away."""
+
+    static_force: float  # N
+
+
+class ForceLoopInputs(NamedTuple):
+    """The wanted motion and the measurements.
+
+    The wanted motion is the sum of a piston velocity and a joint rate; usually one is given.
+    """
+
+    velocity_command: float  # of the piston, m/s
+    joint_rate_command: float  # rad/s
+    angle: float  # of the joint, rad
+    pressure_lifting: float  # Pa
+    pressure_lowering: float  # Pa
+
+
+class ForceLoopOutputs(NamedTuple):
+    """The command and what led to it."""
+
+    valve_command: float  # y2, 1
+    force: float  # F of the measured pressures, N (9)
+    feedback: float  # velocity taken off for damping, m/s (10)
+    velocity: float  # wanted piston velocity behind the feedback, m/s
+    saturated: bool  # the valve is fully open
+
+
+@dataclass(frozen=True)
+class ForceLoop:
+    """y2 = prefilter(v_c - k_F T_H s / (1 + T_H s) F), paper (9), (10), Fig. 8."""
+
+    parameters: ForceLoopParameters
+
+    def initial(self, inputs: ForceLoopInputs) -> ForceLoopState:
+        """Return the state in which the force has been what it is for long."""
+        return ForceLoopState(self._force(inputs))
+
+    def step(
+        self, state: ForceLoopState, inputs: ForceLoopInputs, dt: float
+    ) -> tuple[ForceLoopState, ForceLoopOutputs]:
+        """Return the valve command of this control period of dt, s.
+
+        An input that is not a number shuts the valve and leaves the state as it was.
+        """
+        if not all(math.isfinite(value) for value in inputs):
+            return state, ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
+        p = self.parameters
+        force = self._force(inputs)
+        static_force = low_pass(state.static_force, force, p.time_constant, dt)
+        feedback = p.gain * (force - static_force)
+        wanted = inputs.velocity_command
+        wanted += piston_velocity(inputs.joint_rate_command, inputs.angle, p.prefilter)
+        velocity = wanted - feedback
+        command = valve_command(velocity, p.prefilter)
+        outputs = ForceLoopOutputs(command, force, feedback, velocity, abs(command) >= 1.0)
+        return ForceLoopState(static_force), outputs
+
+    def _force(self, inputs: ForceLoopInputs) -> float:
+        p = self.parameters.prefilter
+        lifting = inputs.pressure_lifting * p.area_lifting
+        return lifting - inputs.pressure_lowering * p.area_lowering

@@ -1,0 +1,55 @@
+"""The static prefilter: from a wanted velocity to the valve's current (paper 3.1, Fig. 8).
+
+It inverts the machine's static nonlinearities as the controller knows them: dead zone, flow
+gain of each direction and, for a wanted joint rate, the linkage ratio.
+"""
+
+import math
+from dataclasses import dataclass
+
+from emir_common.quantity import check_ranges, quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrefilterParameters:
+    """The controller's picture of cylinder, valve and linkage; the machine file's values."""
+
+    area_lifting: float = quantity("m^2", 1e-5, 1.0, "A_H", default=0.06157521601035994)
+    area_lowering: float = quantity("m^2", 1e-5, 1.0, "A_S", default=0.030159289474462014)
+    flow_lifting: float = quantity(
+        "m^3/s", 1e-6, 0.1, "Q_n, fully open, into the lifting chamber", default=1.0 / 300.0
+    )
+    flow_lowering: float = quantity(
+        "m^3/s", 1e-6, 0.1, "fully open, into the lowering chamber", default=1.7959183673469388e-3
+    )
+    dead_zone: float = quantity("1", 0.0, 0.5, "of the valve", default=0.10)
+    standstill: float = quantity(
+        "m/s", 0.0, 0.01, "below this wanted speed the valve stays shut", default=5e-4
+    )
+    triangle_a: float = quantity("m", 0.05, 20.0, "joint to cylinder foot", default=2.0)
+    triangle_b: float = quantity("m", 0.05, 20.0, "joint to rod eye", default=0.65)
+    triangle_gamma0: float = quantity(
+        "rad", 0.0, 3.1, "angle foot-joint-rod eye at alpha = 0", default=0.6981317007977318
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+def valve_command(velocity: float, p: PrefilterParameters) -> float:
+    """Return the valve command y2 in [-1, 1] that gives a steady piston velocity, m/s."""
+    if velocity == 0.0 or abs(velocity) < p.standstill:
+        return 0.0
+    if velocity > 0.0:
+        opening = velocity * p.area_lifting / p.flow_lifting
+    else:
+        opening = velocity * p.area_lowering / p.flow_lowering
+    beyond = p.dead_zone + (1.0 - p.dead_zone) * min(abs(opening), 1.0)
+    return math.copysign(beyond, velocity)
+
+
+def piston_velocity(joint_rate: float, angle: float, p: PrefilterParameters) -> float:
+    """Return the piston velocity, m/s, for a joint rate, rad/s, at the joint angle, rad (1)."""
+    a, b, opening = p.triangle_a, p.triangle_b, angle + p.triangle_gamma0
+    length = math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(opening))
+    return joint_rate * a * b * math.sin(opening) / length

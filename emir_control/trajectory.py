@@ -1,0 +1,136 @@
+"""Desired piston motion: trapezoidal velocity profiles and their integral."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from emir_common.quantity import ParameterError, check_ranges, quantity
+
+
+class Reference(NamedTuple):
+    """The desired piston motion at one instant."""
+
+    stroke: float  # h_d, m
+    velocity: float  # dh_d/dt, m/s
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """One rest-to-rest move with a trapezoidal velocity.
+
+    distance: m, signed. speed: m/s, of the plateau. ramp: s, each of the two ramps.
+    A move too short for the plateau keeps its ramps' slope and turns triangular.
+    """
+
+    distance: float
+    speed: float
+    ramp: float
+
+    @property
+    def _ramp_time(self) -> float:
+        return min(self.ramp, (abs(self.distance) * self.ramp / self.speed) ** 0.5)
+
+    @property
+    def duration(self) -> float:
+        """Return the time of the whole move, s."""
+        if self.distance == 0.0:
+            return 0.0
+        peak = self.speed * self._ramp_time / self.ramp
+        return abs(self.distance) / peak + self._ramp_time
+
+    def at(self, time: float) -> Reference:
+        """Return displacement and velocity `time` s after the start of the move."""
+        if time <= 0.0 or self.distance == 0.0:
+            return Reference(0.0, 0.0)
+        if time >= self.duration:
+            return Reference(self.distance, 0.0)
+        sign = 1.0 if self.distance > 0.0 else -1.0
+        slope = self.speed / self.ramp
+        ramp, remaining = self._ramp_time, self.duration - time
+        if remaining < ramp:  # slowing down: the mirror image of speeding up
+            moved = abs(self.distance) - 0.5 * slope * remaining**2
+            return Reference(sign * moved, sign * slope * remaining)
+        rising = min(time, ramp)
+        moved = 0.5 * slope * rising**2 + slope * ramp * (time - rising)
+        return Reference(sign * moved, sign * slope * rising)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryParameters:
+    """A move away and back: `distance` > 0 lifts first (paper 3.2, Fig. 9).
+
+    25 mm/s is the speed at which the TCP, 22.5 m out, moves with about 0.8 m/s.
+    """
+
+    distance: float = quantity("m", -1.0, 1.0, "of the move, lifting positive", default=0.06375)
+    speed: float = quantity("m/s", 1e-4, 0.2, "of the plateau", default=0.025)
+    ramp: float = quantity("s", 0.01, 10.0, "each ramp of the velocity", default=0.75)
+    delay: float = quantity("s", 0.0, 60.0, "at rest before the first move", default=1.0)
+    pause: float = quantity("s", 0.0, 60.0, "at rest after each move", default=5.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+class TrajectoryState(NamedTuple):
+    """Where the trajectory stands."""
+
+    start: float  # stroke at which it started, m
+    ticks: int  # control periods since
+
+
+class TrajectoryInputs(NamedTuple):
+    """What the trajectory needs to know."""
+
+    stroke: float  # measured stroke, m: a trajectory starts where the machine stands
+
+
+@dataclass(frozen=True)
+class AwayAndBack:
+    """Trapezoidal dh_d/dt away and back, and its integral h_d."""
+
+    parameters: TrajectoryParameters
+
+    @property
+    def duration(self) -> float:
+        """Return the time of the whole trajectory with both pauses, s."""
+        p = self.parameters
+        return p.delay + 2.0 * (self._move.duration + p.pause)
+
+    @property
+    def _move(self) -> Trapezoid:
+        p = self.parameters
+        return Trapezoid(p.distance, p.speed, p.ramp)
+
+    def initial(self, inputs: TrajectoryInputs) -> TrajectoryState:
+        """Return the state that starts at the measured stroke."""
+        return TrajectoryState(inputs.stroke, 0)
+
+    def step(
+        self, state: TrajectoryState, inputs: TrajectoryInputs, dt: float
+    ) -> tuple[TrajectoryState, Reference]:
+        """Return the reference of this control period of dt, s."""
+        p, time = self.parameters, state.ticks * dt
+        away = self._move.at(time - p.delay)
+        back = self._move.at(time - p.delay - self._move.duration - p.pause)
+        reference = Reference(
+            state.start + away.stroke - back.stroke, away.velocity - back.velocity
+        )
+        return TrajectoryState(state.start, state.ticks + 1), reference
+
+
+def named(name: str, parameters: TrajectoryParameters) -> AwayAndBack:
+    """Return the trajectory of that name.
+
+    lift-lower and lower-lift take the sign, hold the length of the move from the name.
+    Raises ParameterError for an unknown name.
+    """
+    size = abs(parameters.distance)
+    distances = {"lift-lower": size, "lower-lift": -size, "hold": 0.0}
+    if name not in distances:
+        raise ParameterError(f"trajectory {name!r}: there are {', '.join(distances)}")
+    p = parameters
+    return AwayAndBack(
+        TrajectoryParameters(
+            distance=distances[name], speed=p.speed, ramp=p.ramp, delay=p.delay, pause=p.pause
+        )
+    )

@@ -1,0 +1,82 @@
+"""Signals by name to standard messages and back, by the table of topics.
+
+Works on any object with the message's fields: rclpy's messages and those that a bag reader
+decodes. Only `message` needs ROS, and imports it when called.
+"""
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from emir_msgs_py.topics import JOINT_STATE, Topic
+
+NANOSECONDS = 1_000_000_000
+_FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?")
+
+
+def field_value(message: Any, path: str) -> float:
+    """Return the number at a path such as `position[0]` or `pose.position.x`.
+
+    Raises LookupError (AttributeError, IndexError made into one) when there is no such field.
+    """
+    value = message
+    for attribute, index in _steps(path):
+        try:
+            value = getattr(value, attribute)
+            value = value if index is None else value[index]
+        except (AttributeError, IndexError):
+            raise LookupError(f"the message has no {path}") from None
+    return float(value)
+
+
+@cache
+def _steps(path: str) -> tuple[tuple[str, int | None], ...]:
+    steps = []
+    for part in path.split("."):
+        match = _FIELD.fullmatch(part)
+        if match is None:
+            raise LookupError(f"{path!r} is not a field path")
+        steps.append((match[1], None if match[2] is None else int(match[2])))
+    return tuple(steps)
+
+
+def values(topic: Topic, message: Any) -> dict[str, float]:
+    """Return the topic's signals by name; raises LookupError when a field is missing."""
+    return {name: field_value(message, field.path) for name, field in topic.fields.items()}
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the message's header stamp in ns."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+@cache
+def message_class(type_name: str) -> Any:
+    """Return the rclpy class of a type such as `sensor_msgs/msg/JointState`."""
+    package, _, name = type_name.split("/")
+    return getattr(import_module(f"{package}.msg"), name)
+
+
+def message(topic: Topic, stamp: int, signals: Mapping[str, float]) -> Any:
+    """Return the topic's message, stamped in ns, from signals by name.
+
+    Raises KeyError when a signal of the topic is missing.
+    """
+    result = message_class(topic.type)()
+    result.header.stamp.sec, result.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+    result.header.frame_id = topic.frame
+    arrays: dict[str, list[float]] = {}
+    for name, field in topic.fields.items():
+        ((attribute, index),) = _steps(field.path)
+        if index is None:
+            setattr(result, attribute, float(signals[name]))
+        else:
+            arrays.setdefault(attribute, []).append(float(signals[name]))
+    for attribute, numbers in arrays.items():
+        setattr(result, attribute, numbers)
+    if topic.type == JOINT_STATE:
+        result.name = list(topic.names)
+    return result

@@ -1,0 +1,114 @@
+"""The table of topics: name, type, signals with field and unit, who publishes, how often.
+
+Only standard message types, so that stock tools show every topic. A JointState carries joints
+and cylinders (prismatic: position m, velocity m/s, effort N); where a topic carries several
+named numbers of a controller it is a JointState too, whose `name` says what each position is.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
+
+PLANT_PERIOD_NS = 8_000_000  # sensors, four times a control period
+CONTROL_PERIOD_NS = 32_000_000  # paper 3.2
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where a signal stands in its message (`position[0]`, `fluid_pressure`) and its unit."""
+
+    path: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic.
+
+    name: relative. publisher: the node that publishes it. every: once a plant or control period.
+    quality: sensor data are best effort for whoever asks for it, commands reliable.
+    fields: signal -> field. names: the `name` list of a JointState.
+    """
+
+    name: str
+    type: str
+    publisher: str
+    every: Literal["plant", "control"]
+    quality: Literal["sensor", "command"]
+    fields: dict[str, Field]
+    names: tuple[str, ...] = ()
+    frame: str = ""
+
+
+def _named_numbers(name: str, publisher: str, every: Literal["plant", "control"],
+                   units: dict[str, str]) -> Topic:
+    fields = {key: Field(f"position[{i}]", unit) for i, (key, unit) in enumerate(units.items())}
+    return Topic(name, JOINT_STATE, publisher, every, "sensor", fields, tuple(units))
+
+
+JOINT_STATES = Topic(
+    "joint_states", JOINT_STATE, "plant_node", "plant", "sensor",
+    {"angle": Field("position[0]", "rad")}, ("joint1",), "base_link",
+)
+CYLINDER_STATES = Topic(
+    "cylinder_states", JOINT_STATE, "plant_node", "plant", "sensor",
+    {"stroke": Field("position[0]", "m"), "force": Field("effort[0]", "N")},
+    ("cylinder1",), "cylinder1",
+)
+PRESSURE_LIFTING = Topic(
+    "pressure_lifting", FLUID_PRESSURE, "plant_node", "plant", "sensor",
+    {"pressure_lifting": Field("fluid_pressure", "Pa")}, (), "cylinder1",
+)
+PRESSURE_LOWERING = Topic(
+    "pressure_lowering", FLUID_PRESSURE, "plant_node", "plant", "sensor",
+    {"pressure_lowering": Field("fluid_pressure", "Pa")}, (), "cylinder1",
+)
+BOOM_DEFLECTION = Topic(
+    "boom_deflection", JOINT_STATE, "plant_node", "plant", "sensor",
+    {"deflection": Field("position[0]", "rad")}, ("boom_tip",), "boom1",
+)
+TRUTH = _named_numbers(
+    "truth", "plant_node", "plant",
+    {
+        "true_angle": "rad", "true_tip_angle": "rad", "true_stroke": "m", "true_velocity": "m/s",
+        "true_force": "N", "true_pressure_lifting": "Pa", "true_pressure_lowering": "Pa",
+        "flow_lifting": "m^3/s", "flow_lowering": "m^3/s", "spool": "1", "logic_block": "1",
+        "tcp_deflection": "m",
+    },
+)  # fmt: skip
+CYLINDER_REFERENCE = Topic(
+    "cylinder_reference", JOINT_STATE, "trajectory_node", "control", "command",
+    {"reference_stroke": Field("position[0]", "m"),
+     "reference_velocity": Field("velocity[0]", "m/s")},
+    ("cylinder1",), "cylinder1",
+)
+VELOCITY_COMMAND = Topic(
+    "velocity_command", JOINT_STATE, "cascade_node", "control", "command",
+    {"velocity_command": Field("velocity[0]", "m/s")}, ("cylinder1",), "cylinder1",
+)
+VALVE_COMMAND = Topic(
+    "valve_command", JOINT_STATE, "force_loop_node", "control", "command",
+    {"valve_command": Field("position[0]", "1")}, ("valve1",), "cylinder1",
+)
+CASCADE_TERMS = _named_numbers(
+    "cascade/terms", "cascade_node", "control",
+    {"feedforward": "m/s", "feedback": "m/s", "smoothed_reference": "m"},
+)
+FORCE_LOOP_TERMS = _named_numbers(
+    "force_loop/terms", "force_loop_node", "control",
+    {"measured_force": "N", "force_feedback": "m/s", "wanted_velocity": "m/s", "saturated": "1"},
+)
+
+TOPICS: tuple[Topic, ...] = (
+    JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING, BOOM_DEFLECTION, TRUTH,
+    CYLINDER_REFERENCE, VELOCITY_COMMAND, VALVE_COMMAND, CASCADE_TERMS, FORCE_LOOP_TERMS,
+)  # fmt: skip
+
+RECORDED = "recorder/recorded"  # std_msgs/Header: all up to this stamp is in the file (lock step)
+
+
+def by_name(name: str) -> Topic:
+    """Return the topic of a relative name; raises KeyError for a name not in the table."""
+    return {topic.name: topic for topic in TOPICS}[name]

@@ -1,0 +1,47 @@
+"""The whole graph in real time, each node a process of its own.
+
+ros2 launch emir_ros emir.launch.py bag:=my_run controller:=cascade namespace:=arm
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+PACKAGE = "emir_ros"
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the launch arguments and the five nodes."""
+    parameters = Path(get_package_share_directory(PACKAGE)) / "config" / "emir.yaml"
+    controller = [LaunchConfiguration("controller"), "_node"]
+    return LaunchDescription(
+        [
+            _argument("bag", None, "folder of the recording; must not exist"),
+            _argument("controller", "cascade", "outer controller: the node is <controller>_node"),
+            _argument("namespace", "", "namespace of all nodes and topics"),
+            _argument("params", str(parameters), "YAML file with the nodes' parameters"),
+            _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
+            _node("plant_node"),
+            _node("force_loop_node"),
+            _node(controller),
+            _node("trajectory_node"),
+        ]
+    )
+
+
+def _argument(name: str, default: str | None, description: str) -> DeclareLaunchArgument:
+    return DeclareLaunchArgument(name, default_value=default, description=description)
+
+
+def _node(executable: str | list[object], parameters: dict[str, object] | None = None) -> Node:
+    return Node(
+        package=PACKAGE,
+        executable=executable,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[LaunchConfiguration("params"), parameters or {}],
+        output="screen",
+    )

@@ -1,0 +1,55 @@
+"""Message definitions as rosbag2 stores them, read from the installed ROS packages."""
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+
+SEPARATOR = "=" * 80
+BUILTIN = re.compile(r"(bool|byte|char|u?int(8|16|32|64)|float(32|64)|w?string)\b")
+
+
+@cache
+def definition(type_name: str) -> str:
+    """Return the text of a type such as `sensor_msgs/msg/JointState` and of all it contains.
+
+    The form is MCAP's `ros2msg`: the type's own text first, then each contained type once,
+    behind a line of `=` and a line `MSG: package/Name`.
+    """
+    package, _, name = type_name.split("/")
+    parts = [_text(package, name)]
+    seen = [(package, name)]
+    for inner in seen:  # grows while it is walked
+        for found in _contained(*inner):
+            if found not in seen:
+                seen.append(found)
+                parts.append(f"{SEPARATOR}\nMSG: {found[0]}/{found[1]}\n{_text(*found)}")
+    return "\n".join(parts)
+
+
+@cache
+def type_hash(type_name: str) -> str:
+    """Return the RIHS01 hash of a type."""
+    package, _, name = type_name.split("/")
+    path = Path(get_package_share_directory(package)) / "msg" / f"{name}.json"
+    hashes = {entry["type_name"]: entry["hash_string"] for entry in
+              json.loads(path.read_text())["type_hashes"]}  # fmt: skip
+    return str(hashes[type_name])
+
+
+def _text(package: str, name: str) -> str:
+    path = Path(get_package_share_directory(package)) / "msg" / f"{name}.msg"
+    return path.read_text()
+
+
+def _contained(package: str, name: str) -> list[tuple[str, str]]:
+    found = []
+    for line in _text(package, name).splitlines():
+        words = line.split("#")[0].split()
+        if len(words) < 2 or BUILTIN.match(words[0]):
+            continue
+        owner, _, inner = words[0].split("[")[0].rpartition("/")
+        found.append((owner or package, inner))
+    return found

@@ -1,0 +1,60 @@
+"""ROS parameters derived from parameter dataclasses, so that each is declared once."""
+
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
+from emir_common.parameter_tree import declared, with_values
+from emir_common.quantity import ParameterError, Quantity
+
+Tree = TypeVar("Tree")
+
+
+def declare_tree(node: Node, tree: Tree) -> Tree:
+    """Declare every quantity of the dataclass as a ROS parameter; return it as then set.
+
+    Raises ParameterError, naming node and parameter, for a value that is out of range.
+    """
+    values = {}
+    for path, (about, default) in declared(tree).items():
+        value = declare(node, path, default, describe(about))
+        if value != default:
+            values[path] = value
+    try:
+        return with_values(tree, values)
+    except ParameterError as error:
+        raise ParameterError(f"{node.get_name()}: {error}") from None
+
+
+def declare(node: Node, name: str, default: Any, description: str) -> Any:
+    """Declare one parameter, fixed while the node runs, and return its value.
+
+    Raises ParameterError for a value of another type; an integer will do for a float.
+    """
+    descriptor = ParameterDescriptor(description=description, read_only=True, dynamic_typing=True)
+    try:
+        value = node.declare_parameter(name, default, descriptor).value
+    except ParameterException as error:
+        raise ParameterError(f"{node.get_name()}: {name}: {error}") from None
+    if isinstance(default, float) and type(value) is int:
+        value = float(value)
+    if type(value) is not type(default):
+        kind = type(default).__name__
+        raise ParameterError(f"{node.get_name()}: {name} = {value!r}: not of type {kind}")
+    return value
+
+
+def reject_unknown(node: Node) -> None:
+    """Raise ParameterError if a value was given for a parameter that the node does not have."""
+    # rclpy keeps the values from command line and files here and offers no other way to them
+    for name in node._parameter_overrides:  # noqa: SLF001
+        standard = name.startswith("qos_overrides.") or name == "start_type_description_service"
+        if not standard and not node.has_parameter(name):
+            raise ParameterError(f"{node.get_name()}: {name}: there is no such parameter")
+
+
+def describe(about: Quantity) -> str:
+    """Return one line: meaning, unit and range."""
+    return f"{about.meaning} [{about.unit}], {about.low:g} ... {about.high:g}"

@@ -1,0 +1,201 @@
+"""plant_node: the simulated machine. In lock step it leads: it takes a step once all answered."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rosgraph_msgs.msg import Clock as ClockMessage
+from std_msgs.msg import Header
+
+from emir_common.quantity import check_ranges, quantity
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import (
+    BOOM_DEFLECTION,
+    CONTROL_PERIOD_NS,
+    CYLINDER_STATES,
+    JOINT_STATES,
+    PLANT_PERIOD_NS,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    RECORDED,
+    TRUTH,
+    VALVE_COMMAND,
+)
+from emir_plant.plant import Plant
+from emir_plant.sensors import measure
+from emir_plant.sheet import joint1, load_sheet
+from emir_ros import qos
+from emir_ros.main import run
+from emir_ros.node_parameters import declare, declare_tree, reject_unknown
+from emir_ros.shell import NodeFailure, Shell
+
+OUTPUTS = [
+    JOINT_STATES,
+    CYLINDER_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    BOOM_DEFLECTION,
+    TRUTH,
+]
+TRUTH_SIGNALS = tuple(TRUTH.fields)  # in the order of emir_plant.core.Truth; a test holds that
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantNodeParameters:
+    """How the machine starts and how long it runs."""
+
+    initial_angle: float = quantity("rad", -0.5, 1.6, "boom angle at the start",
+                                    default=math.pi / 4)  # fmt: skip
+    initial_pressure_lowering: float = quantity(
+        "Pa", 0.0, 3e7, "p_S at the start; p_H follows from the load", default=2e6
+    )
+    duration: float = quantity("s", 0.0, 1e6, "simulated time; 0: without end", default=0.0)
+    command_timeout: float = quantity(
+        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.064
+    )
+    patience: float = quantity(
+        "s", 0.1, 3600.0, "how long lock step waits for an answer", default=30.0
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+class PlantNode(Shell):
+    """valve_command -> sensors, truth, and in lock step /clock."""
+
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        super().__init__("plant_node", OUTPUTS, arguments)
+        self.own = declare_tree(self, PlantNodeParameters())
+        sheet = declare(self, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
+        base = load_sheet(Path(sheet)).machine if sheet else joint1()
+        self.plant = Plant(declare_tree(self, base))
+        self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
+        reject_unknown(self)
+        start = self.own.initial_angle, self.own.initial_pressure_lowering
+        self.state = self.plant.initial(*start)
+        self.truth = self.plant.outputs(self.state)
+        self.tick = 0
+        self._wall = Clock(clock_type=ClockType.STEADY_TIME)
+        self._said = time.monotonic()
+        self._command: tuple[int, float] | None = None
+        self._recorded = -1
+        profile = qos.requested(VALVE_COMMAND, self.lockstep)
+        kind = conversions.message_class(VALVE_COMMAND.type)
+        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile)
+        if self.lockstep:
+            self._start_lockstep()
+        else:
+            self._start_realtime()
+
+    def _step(self, command: float) -> None:
+        self.state, self.truth = self.plant.step(self.state, command, PLANT_PERIOD_NS * 1e-9)
+        self.tick += 1
+
+    def _publish_sensors(self, stamp: int) -> None:
+        reading = measure(self.plant, self.truth, self.tick)
+        signals = reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
+        for topic in OUTPUTS:
+            self.publish(topic, stamp, signals)
+
+    def _show_progress(self) -> None:
+        if time.monotonic() - self._said > 1.0:
+            self._said = time.monotonic()
+            total = f" of {self.own.duration:g}" if self.own.duration else ""
+            self.get_logger().info(f"t = {self.tick * PLANT_PERIOD_NS * 1e-9:.1f}{total} s")
+
+    def _is_over(self) -> bool:
+        last = round(self.own.duration * 1e9 / CONTROL_PERIOD_NS) * CONTROL_PERIOD_NS
+        return self.own.duration > 0.0 and self.tick * PLANT_PERIOD_NS >= last
+
+    # lock step: publish stamp t, wait for the answers to t, step to the next control period
+
+    def _start_lockstep(self) -> None:
+        self._clock = self.create_publisher(ClockMessage, "/clock", qos.offered(lockstep=True))
+        self.create_subscription(Header, RECORDED, self._on_recorded, qos.offered(lockstep=True))
+        self.create_timer(0.5, self._check_patience, clock=self._wall)
+        self._asked = time.monotonic()
+        self._publish_tick()
+
+    def _publish_tick(self) -> None:
+        stamp = self.tick * PLANT_PERIOD_NS
+        clock = ClockMessage()
+        clock.clock.sec, clock.clock.nanosec = divmod(stamp, conversions.NANOSECONDS)
+        self._clock.publish(clock)
+        self._publish_sensors(stamp)
+
+    def _on_recorded(self, message: Header) -> None:
+        stamp = message.stamp
+        self._recorded = stamp.sec * conversions.NANOSECONDS + stamp.nanosec
+        self._advance_when_answered()
+
+    def _advance_when_answered(self) -> None:
+        now = self.tick * PLANT_PERIOD_NS
+        if self._command is None or self._command[0] != now:
+            return
+        if self._recorder and self._recorded < now:
+            return
+        if self._is_over():
+            self.done = True
+            return
+        for _ in range(CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
+            self._step(self._command[1])
+            self._publish_tick()
+        self._asked = time.monotonic()
+        self._show_progress()
+
+    def _check_patience(self) -> None:
+        if time.monotonic() - self._asked < self.own.patience:
+            return
+        now = self.tick * PLANT_PERIOD_NS
+        answered = self._command is not None and self._command[0] == now
+        what = RECORDED if answered else VALVE_COMMAND.name
+        raise NodeFailure(
+            f"plant_node: no {what} for t = {now * 1e-9:.3f} s within {self.own.patience:g} s:"
+            f" is {'recorder_node' if answered else VALVE_COMMAND.publisher} (and what it"
+            " listens to) running?"
+        )
+
+    # real time: one plant period each timer tick, with the latest command
+
+    def _start_realtime(self) -> None:
+        self._command_received = -math.inf
+        self._publish_sensors(self.get_clock().now().nanoseconds)
+        self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
+
+    def _on_timer(self) -> None:
+        age = time.monotonic() - self._command_received
+        command = self._command[1] if self._command else 0.0
+        if self._command is not None and age > self.own.command_timeout:
+            command = 0.0
+            self.get_logger().warning(
+                f"no fresh {VALVE_COMMAND.name}: valve shut", throttle_duration_sec=2.0
+            )
+        self._step(command)
+        self._publish_sensors(self.get_clock().now().nanoseconds)
+        self._show_progress()
+        self.done = self._is_over()
+
+    def _on_command(self, message: Any) -> None:
+        command = conversions.values(VALVE_COMMAND, message)["valve_command"]
+        if not math.isfinite(command):
+            self.get_logger().error(f"{VALVE_COMMAND.name} is {command}: valve shut")
+            command = 0.0
+        self._command = (conversions.stamp_ns(message), command)
+        self._command_received = time.monotonic()
+        if self.lockstep:
+            self._advance_when_answered()
+
+
+def main() -> None:
+    """Run the node until it is done or stopped."""
+    run(PlantNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,122 @@
+"""recorder_node: the graph's topics to an MCAP file that rosbag2's tools take.
+
+Messages are stored as they came (CDR). In lock step they are stored in the order of stamps and
+of the topic table, with the stamp as time, so that two runs give the same recording; each
+finished control period is reported, and the plant waits for that, so that nothing is lost.
+"""
+
+import json
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from std_msgs.msg import Header
+
+from emir_common.quantity import ParameterError
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    PLANT_PERIOD_NS,
+    RECORDED,
+    TOPICS,
+    Topic,
+    by_name,
+)
+from emir_ros import qos
+from emir_ros.main import run
+from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.rosbag2_writer import Rosbag2Writer
+from emir_ros.shell import Shell
+
+CDR_STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
+
+
+class RecorderNode(Shell):
+    """Every topic of the table (or those named) -> recording, recorder/recorded."""
+
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        super().__init__("recorder_node", [], arguments)
+        everything = [topic.name for topic in TOPICS]
+        folder: str = declare(self, "bag", "", "folder of the recording, must not exist")
+        names: list[str] = declare(self, "topics", everything, "topics to record")
+        about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
+        reject_unknown(self)
+        if not folder:
+            raise ParameterError("recorder_node: bag: the folder of the recording is missing")
+        self._topics = [_known(name) for name in names]
+        self._writer = Rosbag2Writer(Path(folder))
+        self._writer.add_metadata("emir", json.loads(about))
+        self._ack = self.create_publisher(Header, RECORDED, qos.offered(self.lockstep))
+        self._pending: dict[int, dict[str, bytes]] = {}
+        self._next = 0
+        for topic in self._topics:
+            self._record(topic)
+
+    @property
+    def writer(self) -> Rosbag2Writer:
+        """Return the recording so far."""
+        return self._writer
+
+    def close(self) -> None:
+        """Write what is left and finish the file."""
+        for stamp in sorted(self._pending):
+            self._write_stamp(stamp)
+        self._writer.close()
+
+    def _record(self, topic: Topic) -> None:
+        full_name = self.resolve_topic_name(topic.name)
+        profile = qos.offered(self.lockstep)
+        self._writer.add_topic(full_name, topic.type, [qos.as_rosbag2(profile)])
+
+        def receive(data: bytes) -> None:
+            sec, nanosec = CDR_STAMP.unpack_from(data)
+            stamp = sec * conversions.NANOSECONDS + nanosec
+            if self.lockstep:
+                self._on_stamp(topic, stamp, data)
+            else:
+                self._writer.write(full_name, data, self.get_clock().now().nanoseconds, stamp)
+
+        kind = conversions.message_class(topic.type)
+        self.create_subscription(kind, topic.name, receive, profile, raw=True)
+
+    def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
+        self._pending.setdefault(stamp, {})[topic.name] = data
+        while self._is_complete(self._next):
+            self._write_stamp(self._next)
+            if self._next % CONTROL_PERIOD_NS == 0:
+                self._report(self._next)
+            self._next += PLANT_PERIOD_NS
+
+    def _is_complete(self, stamp: int) -> bool:
+        controlled = stamp % CONTROL_PERIOD_NS == 0
+        expected = sum(controlled or topic.every == "plant" for topic in self._topics)
+        return len(self._pending.get(stamp, ())) == expected
+
+    def _write_stamp(self, stamp: int) -> None:
+        messages = self._pending.pop(stamp)
+        for topic in self._topics:
+            if topic.name in messages:
+                full_name = self.resolve_topic_name(topic.name)
+                self._writer.write(full_name, messages[topic.name], stamp, stamp)
+
+    def _report(self, stamp: int) -> None:
+        message: Any = Header()
+        message.stamp.sec, message.stamp.nanosec = divmod(stamp, conversions.NANOSECONDS)
+        self._ack.publish(message)
+
+
+def _known(name: str) -> Topic:
+    try:
+        return by_name(name)
+    except KeyError:
+        raise ParameterError(f"recorder_node: topics: {name!r} is not a topic of EMIR") from None
+
+
+def main() -> None:
+    """Record until stopped."""
+    run(RecorderNode)
+
+
+if __name__ == "__main__":
+    main()

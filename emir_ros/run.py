@@ -1,0 +1,164 @@
+"""`emir run`: start the graph, wait for the machine's run to end, stop it, show its figures."""
+
+import argparse
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+
+from emir_analysis.errors import InputError
+from emir_analysis.run_report import analyze, text
+from emir_common.quantity import ParameterError
+from emir_plant.plant import SimulationError
+from emir_ros.graph import CONTROLLERS, Plan, check, ros_arguments
+from emir_ros.main import make_executor
+from emir_ros.shell import NodeFailure, Shell
+
+INTERRUPTED = 130  # what a shell reports after Ctrl-C
+GRACE = 10.0  # s that a node has to end before it is killed
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the graph as the arguments say; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    plan = Plan(
+        bag=options.bag,
+        controller=options.controller,
+        trajectory=options.trajectory,
+        duration=options.duration,
+        params=options.params,
+        lockstep=not options.realtime,
+    )
+    try:
+        check(plan)
+    except ParameterError as error:
+        return _complain(str(error), 1)
+    code = _run(plan, options.processes)
+    if plan.bag.is_dir():  # what there is, however it ended
+        shown = _show(plan.bag)
+        code = code or shown
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
+    parser.add_argument("--controller", default="cascade", help=", ".join(CONTROLLERS))
+    parser.add_argument("--trajectory", default="lift-lower", help="lift-lower, lower-lift, hold")
+    parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
+    parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
+    pace = parser.add_mutually_exclusive_group()
+    pace.add_argument("--realtime", action="store_true", help="as fast as the clock on the wall")
+    pace.add_argument("--lockstep", action="store_true", help="as fast as it goes (default)")
+    parser.add_argument("--processes", choices=("one", "many"), default="one")
+    parser.add_argument("--bag", type=Path, required=True, metavar="DIR", help="the recording")
+    return parser
+
+
+def _run(plan: Plan, processes: str) -> int:
+    """Return the exit code; the recording is closed when this returns."""
+    try:
+        with ros_arguments(plan) as ros:
+            if processes == "one":
+                _run_in_one_process(plan, ros)
+            else:
+                _run_in_many_processes(plan, ros)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return _complain("interrupted", INTERRUPTED)
+    except (ParameterError, NodeFailure, SimulationError) as error:
+        return _complain(str(error), 1)
+    return 0
+
+
+def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
+    rclpy.init()
+    nodes: dict[str, Shell] = {}
+    try:
+        executor = make_executor(plan.lockstep)
+        for name in plan.nodes:
+            nodes[name] = _node_class(name)(ros)
+            executor.add_node(nodes[name])
+        plant = nodes["plant_node"]
+        while not plant.done:
+            if not rclpy.ok():
+                raise KeyboardInterrupt
+            executor.spin_once(timeout_sec=0.1)
+        _receive_the_rest(executor)
+    finally:
+        for node in nodes.values():
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _node_class(name: str) -> Callable[[list[str]], Shell]:
+    module = import_module(f"emir_ros.{name}")
+    kind: Callable[[list[str]], Shell] = getattr(module, name.title().replace("_", ""))
+    return kind
+
+
+def _receive_the_rest(executor: Any) -> None:
+    """Give the recorder what the plant published last; lock step has waited for that already."""
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.05)
+
+
+def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    processes: dict[str, subprocess.Popen[bytes]] = {}
+    try:
+        for name in plan.nodes:
+            command = [sys.executable, "-m", f"emir_ros.{name}", *ros]
+            processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
+        _wait_for_plant(processes)
+    finally:
+        for name in reversed(plan.nodes):  # the recorder last, it hears all the others
+            if name in processes:
+                _stop(processes[name])
+
+
+def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:
+    """Return when the plant has run to its end; raises NodeFailure when a node died before."""
+    while True:
+        for name, process in processes.items():
+            code = process.poll()
+            if code is None:
+                continue
+            if name == "plant_node" and code == 0:
+                return
+            how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended ({code})"
+            raise NodeFailure(f"{name} {how} before the run was over")
+        time.sleep(0.02)
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _show(bag: Path) -> int:
+    try:
+        print(text(analyze(bag)))  # noqa: T201 (a command prints)
+    except InputError as error:
+        return _complain(str(error), 1)
+    return 0
+
+
+def _complain(message: str, code: int) -> int:
+    sys.stderr.write(f"emir run: {message}\n")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

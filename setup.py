@@ -1,0 +1,58 @@
+"""One distribution with all packages, which is also the ament package `emir_ros`.
+
+All of it stands here and none in pyproject.toml, because colcon's build sees only this file and
+setup.cfg when it installs by symbolic links.
+"""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "emir_ros"  # also in package.xml: colcon finds an earlier build by it
+
+
+def matching(pattern: str) -> list[str]:
+    """Return the files of the checkout that match, by relative path as setuptools wants them."""
+    return [str(path) for path in sorted(Path().glob(pattern))]
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="EMIR, a large hydraulic robot arm: simulated machine, control and diagnosis",
+    license="Apache-2.0",
+    python_requires=">=3.11,<3.13",
+    packages=find_packages(include=["emir_*"]),
+    package_data={"": ["py.typed", "data/*.yaml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", matching("emir_ros/launch/*.launch.py")),
+        (f"share/{NAME}/config", matching("emir_ros/config/*.yaml")),
+        (f"lib/{NAME}", matching("emir_ros/executables/*_node")),
+    ],
+    entry_points={"console_scripts": ["emir = emir_analysis.cli:main"]},
+    install_requires=[
+        "matplotlib>=3.8",
+        "mcap>=1.1",
+        "mcap-ros2-support>=0.5",
+        "numba>=0.59",
+        "numpy>=1.26",
+        "pyyaml>=6.0",
+        "rich>=13.0",
+        "scipy>=1.11",
+    ],
+    extras_require={
+        # ROS 2 Jazzy without an installation of ROS; not wanted where a Jazzy is sourced.
+        "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
+        "test": ["control>=0.10", "pytest>=8.2", "pytest-timeout>=2.3", "rosbags>=0.10"],
+        # What ruff and mypy report changes with every minor release: raise them on purpose.
+        "lint": [
+            "mypy~=2.4.1",
+            "pre-commit>=4.0",
+            "ruff~=0.17.5",
+            "scipy-stubs>=1.17",
+            "types-PyYAML>=6.0",
+        ],
+    },
+)

@@ -1,0 +1,54 @@
+"""The launch file starts every node that `ros2 run` finds. Stand-ins replace ROS's launch."""
+
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType
+from unittest.mock import MagicMock
+
+import pytest
+
+LAUNCH_FILE = Path(__file__).parents[2] / "emir_ros" / "launch" / "emir.launch.py"
+EXECUTABLES = LAUNCH_FILE.parents[1] / "executables"
+
+
+@pytest.fixture
+def launch(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
+    """Replace every module that the launch file imports; return the stand-in of all names."""
+    names = MagicMock()
+    names.LaunchConfiguration = lambda name: f"<{name}>"
+    names.get_package_share_directory = lambda package: f"/share/{package}"
+    for path in (
+        "ament_index_python.packages",
+        "launch",
+        "launch.actions",
+        "launch.substitutions",
+        "launch_ros.actions",
+    ):
+        module = ModuleType(path)
+        module.__getattr__ = lambda name: getattr(names, name)  # type: ignore[method-assign]
+        monkeypatch.setitem(sys.modules, path, module)
+    runpy.run_path(str(LAUNCH_FILE))["generate_launch_description"]()
+    return names
+
+
+def test_every_executable_is_started(launch: MagicMock) -> None:
+    started = {"".join(call.kwargs["executable"]) for call in launch.Node.call_args_list}
+    executables = {path.name for path in EXECUTABLES.glob("*_node")}
+    assert {name.replace("<controller>", "cascade") for name in started} == executables
+
+
+def test_every_configuration_is_a_declared_argument(launch: MagicMock) -> None:
+    declared = {call.args[0] for call in launch.DeclareLaunchArgument.call_args_list}
+    assert declared == {"bag", "controller", "namespace", "params"}
+    used = str(launch.Node.call_args_list)
+    assert all(f"<{name}>" in used for name in declared)
+
+
+def test_parameter_file_is_installed(launch: MagicMock) -> None:
+    defaults = {
+        call.args[0]: call.kwargs["default_value"]
+        for call in launch.DeclareLaunchArgument.call_args_list
+    }
+    name = Path(defaults["params"]).relative_to("/share/emir_ros/config")
+    assert (LAUNCH_FILE.parents[1] / "config" / name).is_file()

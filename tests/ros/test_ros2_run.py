@@ -1,0 +1,92 @@
+"""`ros2 run emir_ros <node>`: every node is found, starts, and ends well when it is told to."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from emir_msgs_py.topics import TOPICS, VALVE_COMMAND
+
+rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.signals import SignalHandlerOptions  # noqa: E402
+
+PACKAGE = "emir_ros"
+NODES = ("cascade_node", "force_loop_node", "plant_node", "recorder_node", "trajectory_node")
+DEADLINE = 120.0  # s; the machine's first start compiles it
+
+PUBLISHED = {name: {t.name for t in TOPICS if t.publisher == name} for name in NODES}
+SUBSCRIBED = {"plant_node": {VALVE_COMMAND.name}, "recorder_node": {t.name for t in TOPICS}}
+
+
+def executables() -> dict[str, Path]:
+    """Return the package's executables by name, looked up as ros2cli does.
+
+    ros2pkg.api.get_executable_paths: the prefix from the ament index, then every file below
+    <prefix>/lib/<package> that may be executed.
+    """
+    try:
+        prefix = Path(get_package_prefix(PACKAGE))
+    except (PackageNotFoundError, OSError):
+        pytest.skip(f"{PACKAGE} is not in the ament index: `pip install .` puts it there, -e not")
+    paths = (prefix / "lib" / PACKAGE).rglob("*")
+    return {path.name: path for path in paths if path.is_file() and os.access(path, os.X_OK)}
+
+
+@pytest.fixture
+def observer() -> Iterator[Node]:
+    """Yield a node that looks at the graph."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = Node("observer")
+    yield node
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def missing_topics(observer: Node, name: str) -> list[str]:
+    """Return which of the node's topics the graph does not show."""
+    published = [f"publishes {t}" for t in PUBLISHED[name] if not observer.count_publishers(t)]
+    subscribed = SUBSCRIBED.get(name, set())
+    return published + [f"takes {t}" for t in subscribed if not observer.count_subscribers(t)]
+
+
+def wait_until_seen(observer: Node, name: str, process: subprocess.Popen[str]) -> None:
+    """Return once the graph shows all the node's topics; fail when it ends or takes too long."""
+    deadline = time.monotonic() + DEADLINE
+    while missing := missing_topics(observer, name):
+        assert process.poll() is None, f"{name} ended early"
+        assert time.monotonic() < deadline, f"{name}: not seen that it {', '.join(missing)}"
+        rclpy.spin_once(observer, timeout_sec=0.05)
+
+
+def test_every_node_has_an_executable() -> None:
+    assert executables().keys() >= set(NODES)
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=lambda s: str(s.name))
+@pytest.mark.parametrize("name", NODES)
+def test_node_starts_and_stops(
+    name: str, stop: signal.Signals, observer: Node, tmp_path: Path
+) -> None:
+    command = [str(executables()[name])]
+    if name == "recorder_node":
+        command += ["--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
+    said = tmp_path / "said"
+    with (
+        said.open("w") as output,
+        subprocess.Popen(command, stdout=output, stderr=output, text=True) as process,
+    ):
+        try:
+            wait_until_seen(observer, name, process)
+            process.send_signal(stop)
+            process.wait(DEADLINE)
+        finally:
+            process.kill()
+    assert process.returncode == 0, said.read_text()
+    assert "Traceback" not in said.read_text()

@@ -23,6 +23,9 @@ endif
 SUITS := import ensurepip, sys, venv; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
 PYTHON = $(firstword $(foreach p,$(CANDIDATES),$(shell $(p) -c '$(SUITS)' 2>/dev/null && echo $(p))))
 
+# What is run is what was installed, although the checkout is the current folder.
+export PYTHONSAFEPATH := 1
+
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # With the folders, so that a deleted file counts as a change, too.
 SOURCES := $(shell find emir_* resource -not -path '*__pycache__*')
@@ -63,12 +66,12 @@ demo: install
 	@echo 'Figures    $(CURDIR)/$(OUT).json'
 
 test: install
-	$(BIN)/python -P -m pytest $(ARGS)
+	$(BIN)/python -m pytest $(ARGS)
 
 lint: install
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m ruff format --check .
+	$(BIN)/python -m mypy
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info $(OUT) $(OUT).json $(OUT).html

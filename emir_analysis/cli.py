@@ -36,6 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return commands[words[0]](words[1:])
     except (InputError, ParameterError) as error:
         return _complain(f"emir {words[0]}", str(error))
+    except BrokenPipeError:  # whoever read our output has seen enough
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (lives until the end)
+        return 1
     except KeyboardInterrupt:
         return 130
 

@@ -27,8 +27,9 @@ class Quantity:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{name} = {value!r}: not a number")
         if not math.isfinite(value) or not self.low <= value <= self.high:
+            unit = "" if self.unit == "1" else f" {self.unit}"
             raise ParameterError(
-                f"{name} = {value:g}: outside {self.low:g} ... {self.high:g} {self.unit}"
+                f"{name} = {value:g}: outside {self.low:g} ... {self.high:g}{unit}"
             )
 
 

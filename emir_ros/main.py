@@ -1,11 +1,14 @@
 """How a node runs as a process of its own, and how it ends."""
 
+import signal
 import sys
 from collections.abc import Callable
+from types import FrameType
 from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
@@ -15,6 +18,27 @@ try:
     from rclpy.experimental import EventsExecutor
 except ImportError:  # an older Jazzy: everything works, lock step is slower
     EventsExecutor = SingleThreadedExecutor
+
+
+class StopRequest:
+    """SIGINT or SIGTERM, taken note of; the loop that spins looks at it between two callbacks.
+
+    rclpy's own handlers would shut the context down under a callback that is publishing.
+    """
+
+    def __init__(self) -> None:
+        self.made = False
+        signal.signal(signal.SIGINT, self._make)
+        signal.signal(signal.SIGTERM, self._make)
+
+    def _make(self, _number: int, _frame: FrameType | None) -> None:
+        self.made = True
+
+
+def start_ros() -> StopRequest:
+    """Initialize rclpy; returns what SIGINT and SIGTERM set from now on."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    return StopRequest()
 
 
 def make_executor(lockstep: bool) -> Any:
@@ -33,11 +57,11 @@ def run(node_class: Callable[[], Shell]) -> None:
 def _run(node_class: Callable[[], Shell]) -> int:
     node: Shell | None = None
     try:
-        rclpy.init()
+        stop = start_ros()
         node = node_class()
         executor = make_executor(node.lockstep)
         executor.add_node(node)
-        while rclpy.ok() and not node.done:
+        while not (stop.made or node.done):
             executor.spin_once(timeout_sec=0.1)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0

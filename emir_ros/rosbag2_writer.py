@@ -1,6 +1,7 @@
 """A recording in rosbag2's own form: an MCAP file of CDR messages and metadata.yaml (version 9)."""
 
-from dataclasses import dataclass, field
+import shutil
+from dataclasses import dataclass
 
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +17,17 @@ from emir_ros.message_definitions import definition, type_hash
 CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose
 
 
+class _Plain(yaml.SafeDumper):
+    """YAML without anchors, as rosbag2 writes it."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _yaml(content: Any) -> str:
+    return yaml.dump(content, Dumper=_Plain, sort_keys=False)
+
+
 @dataclass
 class Channel:
     """A topic of the recording."""
@@ -25,7 +37,6 @@ class Channel:
     qos: list[dict[str, Any]]
     id: int
     count: int = 0
-    sequence: int = field(default=0)
 
 
 class Rosbag2Writer:
@@ -83,7 +94,7 @@ class Rosbag2Writer:
             message_encoding="cdr",
             schema_id=self._schemas[type_name],
             metadata={
-                "offered_qos_profiles": yaml.safe_dump(qos, sort_keys=False),
+                "offered_qos_profiles": _yaml(qos),
                 "topic_type_hash": type_hash(type_name),
             },
         )
@@ -102,14 +113,19 @@ class Rosbag2Writer:
         self._end = max(self._end, log_time)
 
     def close(self) -> None:
-        """Finish the file and write metadata.yaml; a second call does nothing."""
+        """Finish the file and write metadata.yaml; without a message, leave no folder behind.
+
+        A second call does nothing.
+        """
         if self._stream.closed:
             return
-        text = yaml.safe_dump(self._metadata(), sort_keys=False)
+        text = _yaml(self._metadata())
         self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
         self._writer.finish()
         self._stream.close()
         (self.folder / "metadata.yaml").write_text(text)
+        if not self.message_count:
+            shutil.rmtree(self.folder)
 
     def _metadata(self) -> dict[str, Any]:
         start = {"nanoseconds_since_epoch": self._start or 0}

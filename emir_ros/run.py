@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from emir_analysis.run_report import analyze, text
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, Plan, check, ros_arguments
-from emir_ros.main import make_executor
+from emir_ros.main import make_executor, start_ros
 from emir_ros.shell import NodeFailure, Shell
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
@@ -71,13 +71,16 @@ def _run(plan: Plan, processes: str) -> int:
                 _run_in_many_processes(plan, ros)
     except (KeyboardInterrupt, ExternalShutdownException):
         return _complain("interrupted", INTERRUPTED)
-    except (ParameterError, NodeFailure, SimulationError) as error:
+    except ParameterError as error:
+        where = f"{plan.params}: " if plan.params else ""
+        return _complain(f"{where}{error}", 1)
+    except (NodeFailure, SimulationError) as error:
         return _complain(str(error), 1)
     return 0
 
 
 def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
-    rclpy.init()
+    stop = start_ros()
     nodes: dict[str, Shell] = {}
     try:
         executor = make_executor(plan.lockstep)
@@ -86,7 +89,7 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             executor.add_node(nodes[name])
         plant = nodes["plant_node"]
         while not plant.done:
-            if not rclpy.ok():
+            if stop.made:
                 raise KeyboardInterrupt
             executor.spin_once(timeout_sec=0.1)
         _receive_the_rest(executor)
@@ -119,9 +122,10 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
             processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
         _wait_for_plant(processes)
     finally:
-        for name in reversed(plan.nodes):  # the recorder last, it hears all the others
-            if name in processes:
-                _stop(processes[name])
+        recorder = processes.pop("recorder_node", None)
+        _stop(processes.values())
+        if recorder is not None:  # the last one, since it hears all the others
+            _stop([recorder])
 
 
 def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:
@@ -138,13 +142,15 @@ def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:
         time.sleep(0.02)
 
 
-def _stop(process: subprocess.Popen[bytes]) -> None:
-    process.send_signal(signal.SIGINT)
-    try:
-        process.wait(GRACE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+def _stop(processes: Collection[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+    for process in processes:
+        try:
+            process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def _show(bag: Path) -> int:

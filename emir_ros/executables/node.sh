@@ -1,7 +1,8 @@
 #!/bin/sh
 # What `ros2 run emir_ros <name>` starts: the module of that name, with the interpreter of the
 # environment this file is installed in or, in a colcon workspace, the sourced one.
-prefix=$(dirname "$(dirname "$(dirname "$0")")")
+# -P: what lies in the current folder is not imported.
+prefix=$(cd "$(dirname "$0")/../.." && pwd)
 python="$prefix/bin/python"
 [ -x "$python" ] || python=python3
-exec "$python" -m "emir_ros.$(basename "$0")" "$@"
+exec "$python" -P -m "emir_ros.$(basename "$0")" "$@"

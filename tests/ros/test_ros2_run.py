@@ -43,10 +43,12 @@ def executables() -> dict[str, Path]:
 def observer() -> Iterator[Node]:
     """Yield a node that looks at the graph."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = Node("observer")
-    yield node
-    node.destroy_node()
-    rclpy.shutdown()
+    try:
+        node = Node("observer")
+        yield node
+        node.destroy_node()
+    finally:
+        rclpy.shutdown()
 
 
 def missing_topics(observer: Node, name: str) -> list[str]:

@@ -1,0 +1,126 @@
+"""What a fit may change: the toleranced parameters and the parameters of effects, as a vector."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from numpy.typing import NDArray
+
+from emir_analysis.signals import Array
+from emir_common.quantity import quantities
+from emir_plant.effects import REGISTRY
+from emir_plant.parameters import Machine, groups
+from emir_plant.sheet import Sheet
+
+WIDE = 20.0  # an effect's parameter whose range spans more than this factor is fitted as its log
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One parameter and its scale: value = origin + scale x, or origin exp(x) when logarithmic.
+
+    low, high: bounds of x. start: x at which a search starts. toleranced: stated by the maker
+    with a tolerance, then x runs from -1 to 1 over it.
+    """
+
+    path: str
+    unit: str
+    origin: float
+    scale: float
+    low: float
+    high: float
+    start: float
+    toleranced: bool
+    logarithmic: bool = False
+
+    def value(self, x: float) -> float:
+        """Return the parameter's value, SI unit."""
+        if self.logarithmic:
+            return self.origin * math.exp(x)
+        return self.origin + self.scale * x
+
+    def deviation(self, x: float, width: float) -> tuple[float, float]:
+        """Return the values at x - width and x + width, inside the bounds."""
+        return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """A machine and what may be changed in it, in the order of the fit's vector."""
+
+    machine: Machine
+    members: tuple[Unknown, ...]
+
+    @property
+    def start(self) -> Array:
+        """Where a search starts, (k,)."""
+        return np.array([unknown.start for unknown in self.members])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest admissible vector, (k,) each."""
+        low = [unknown.low for unknown in self.members]
+        high = [unknown.high for unknown in self.members]
+        return np.array(low), np.array(high)
+
+    @property
+    def toleranced(self) -> NDArray[np.bool_]:
+        """Which unknowns the maker states with a tolerance, (k,)."""
+        return np.array([unknown.toleranced for unknown in self.members])
+
+    def values(self, x: Array) -> dict[str, float]:
+        """Return the parameters' values by dotted path, SI units."""
+        return {u.path: u.value(float(v)) for u, v in zip(self.members, x, strict=True)}
+
+    def at(self, x: Array) -> Machine:
+        """Return the machine with the parameters at x."""
+        return with_values(self.machine, self.values(x))
+
+
+def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
+    """Return the sheet's toleranced parameters and all parameters of the named effects."""
+    stated = groups(sheet.machine)
+    members = [_toleranced(stated, path, tol) for path, tol in sheet.tolerances.items()]
+    for effect in effects:
+        members += _of_effect(effect)
+    return Unknowns(sheet.machine, tuple(members))
+
+
+def with_values(machine: Machine, values: Mapping[str, float]) -> Machine:
+    """Return the machine with parameters replaced by dotted path (`effects.NAME.FIELD` too)."""
+    stated = groups(machine)
+    changed: dict[str, dict[str, float]] = {}
+    for path, value in values.items():
+        group, name = path.rsplit(".", 1)
+        changed.setdefault(group, {})[name] = value
+    new = {group: dataclasses.replace(stated[group], **names) for group, names in changed.items()}
+    effects = {g.removeprefix("effects."): new.pop(g) for g in list(new) if g.startswith("effects.")}
+    return dataclasses.replace(
+        machine, effects=dataclasses.replace(machine.effects, **effects), **new
+    )
+
+
+def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Unknown:
+    group, name = path.rsplit(".", 1)
+    value = float(getattr(stated[group], name))
+    unit = quantities(stated[group])[name].unit
+    return Unknown(path, unit, value, abs(value) * tolerance, -1.0, 1.0, 0.0, toleranced=True)
+
+
+def _of_effect(effect: str) -> list[Unknown]:
+    kind = REGISTRY[effect]
+    defaults = {f.name: f.default for f in dataclasses.fields(kind)}
+    members = []
+    for name, about in quantities(kind).items():
+        value = float(kind.trial.get(name, defaults[name]))
+        path = f"effects.{effect}.{name}"
+        if about.low > 0.0 and about.high / about.low > WIDE:
+            low, high = math.log(about.low / value), math.log(about.high / value)
+            members.append(Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True))
+        else:
+            low, high = about.low / abs(value), about.high / abs(value)
+            members.append(Unknown(path, about.unit, 0.0, abs(value), low, high, 1.0, False))
+    return members

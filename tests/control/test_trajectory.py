@@ -1,0 +1,53 @@
+"""Trapezoidal profiles: h_d is the integral of dh_d/dt, the limits hold, it ends at rest."""
+
+import numpy as np
+import pytest
+from emir_common.quantity import ParameterError
+from emir_control.trajectory import Trapezoid, TrajectoryInputs, TrajectoryParameters, named
+from scipy.integrate import cumulative_simpson
+
+CASES = [Trapezoid(0.06375, 0.025, 0.75), Trapezoid(-0.2, 0.05, 0.4), Trapezoid(0.002, 0.025, 0.75)]
+
+
+@pytest.mark.parametrize("move", CASES)
+def test_stroke_is_the_integral_of_the_velocity(move: Trapezoid) -> None:
+    time = np.linspace(0.0, move.duration, 20001)
+    stroke, velocity = np.array([move.at(t) for t in time]).T
+    assert stroke == pytest.approx(cumulative_simpson(velocity, x=time, initial=0.0), abs=1e-9)
+    assert stroke[-1] == move.distance
+    assert velocity[0] == velocity[-1] == 0.0
+
+
+@pytest.mark.parametrize("move", CASES)
+def test_speed_and_slope_stay_within_their_limits(move: Trapezoid) -> None:
+    time = np.linspace(0.0, move.duration, 20001)
+    velocity = np.array([move.at(t).velocity for t in time])
+    assert np.abs(velocity).max() <= move.speed * (1 + 1e-12)
+    slope = np.diff(velocity) / np.diff(time)
+    assert np.abs(slope).max() <= move.speed / move.ramp * (1 + 1e-6)
+
+
+def test_the_papers_move_takes_3_3_s() -> None:
+    assert Trapezoid(0.06375, 0.025, 0.75).duration == pytest.approx(3.3)
+
+
+def test_a_trajectory_starts_where_the_machine_stands_and_comes_back() -> None:
+    trajectory = named("lift-lower", TrajectoryParameters())
+    inputs = TrajectoryInputs(0.31)
+    state = trajectory.initial(inputs)
+    strokes = []
+    for _ in range(round(trajectory.duration / 0.032) + 1):
+        state, reference = trajectory.step(state, TrajectoryInputs(9.9), 0.032)
+        strokes.append(reference.stroke)
+    assert strokes[0] == 0.31
+    assert strokes[-1] == pytest.approx(0.31, abs=1e-12)
+    assert max(strokes) == pytest.approx(0.31 + 0.06375, abs=1e-12)
+    assert min(strokes) >= 0.31 - 1e-12
+
+
+def test_the_name_gives_the_direction() -> None:
+    p = TrajectoryParameters()
+    assert named("lower-lift", p).parameters.distance == -p.distance
+    assert named("hold", p).parameters.distance == 0.0
+    with pytest.raises(ParameterError, match="there are lift-lower, lower-lift, hold"):
+        named("circle", p)

@@ -1,0 +1,47 @@
+"""The table of topics against the objects and the messages that it speaks of."""
+
+from collections import Counter
+
+import pytest
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import TOPICS, TRUTH, Topic, by_name
+from emir_plant.core import Truth
+from emir_plant.sensors import Measurement
+
+IDS = [topic.name for topic in TOPICS]
+
+
+def test_names_are_relative_and_signals_unique() -> None:
+    assert not any(topic.name.startswith("/") for topic in TOPICS)
+    assert max(Counter(IDS).values()) == 1
+    assert max(Counter(signal for topic in TOPICS for signal in topic.fields).values()) == 1
+    assert by_name("truth") is TRUTH
+
+
+def test_truth_has_the_models_outputs_in_their_order() -> None:
+    names = [name.removeprefix("true_") for name in TRUTH.fields]
+    assert names == list(Truth._fields)
+
+
+def test_every_measurement_is_published() -> None:
+    plants = {s for t in TOPICS if t.publisher == "plant_node" for s in t.fields}
+    assert set(Measurement._fields) <= plants
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=IDS)
+def test_signals_survive_the_message_and_its_cdr(topic: Topic) -> None:
+    serialization = pytest.importorskip("rclpy.serialization", reason="needs ROS 2")
+    signals = {name: 0.1 + 1.7 * k for k, name in enumerate(topic.fields)}
+    message = conversions.message(topic, 1_234_567_890_123, signals)
+    cdr = serialization.serialize_message(message)
+    back = serialization.deserialize_message(cdr, type(message))
+    assert conversions.values(topic, back) == signals
+    assert conversions.stamp_ns(back) == 1_234_567_890_123
+    assert back.header.frame_id == topic.frame
+
+
+def test_a_field_that_is_not_there_is_named() -> None:
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    message = conversions.message(by_name("valve_command"), 0, {"valve_command": 0.5})
+    with pytest.raises(LookupError, match=r"no velocity\[3\]"):
+        conversions.field_value(message, "velocity[3]")

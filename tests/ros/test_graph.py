@@ -1,0 +1,311 @@
+"""The graph against the plain loop, its recordings against other readers, and dying nodes."""
+
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from emir_analysis.closed_loop import ClosedLoop
+from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TOPICS, by_name
+from emir_plant.plant import Plant
+from emir_plant.sheet import joint1
+from emir_ros.graph import Plan, duration, ros_arguments
+from emir_ros.run import main as run_graph
+from emir_ros.rosbag2_writer import Rosbag2Writer
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosReliability
+
+DURATION = 4.8  # s: at rest, and into the plateau of the first move
+
+
+@pytest.fixture
+def loop_signals() -> dict[str, np.ndarray]:
+    """What the plain loop gives, without ROS."""
+    loop = ClosedLoop(Plant(joint1()), named("lift-lower", TrajectoryParameters()))
+    return loop.run(math.pi / 4, 2e6, DURATION)
+
+
+def _read_with_rosbags(bag: Path) -> dict[str, list[tuple[int, object]]]:
+    found: dict[str, list[tuple[int, object]]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, log_time, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            found.setdefault(connection.topic, []).append((log_time, message))
+    return found
+
+
+def _assert_equal(bag: Path, loop: dict[str, np.ndarray]) -> None:
+    recorded = _read_with_rosbags(bag)
+    assert recorded.keys() == {f"/{topic.name}" for topic in TOPICS}
+    for topic in TOPICS:
+        period = PLANT_PERIOD_NS if topic.every == "plant" else CONTROL_PERIOD_NS
+        messages = recorded[f"/{topic.name}"]
+        stamps = [conversions.stamp_ns(message) for _, message in messages]
+        assert stamps == [k * period for k in range(round(DURATION * 1e9 / period) + 1)]
+        assert stamps == [log_time for log_time, _ in messages]
+        for name in topic.fields:
+            values = [conversions.values(topic, message)[name] for _, message in messages]
+            assert np.array_equal(values, loop[name]), name
+
+
+@pytest.mark.parametrize("processes", ["one", "many"])
+def test_lockstep_graph_equals_the_plain_loop(
+    processes: str, tmp_path: Path, loop_signals: dict[str, np.ndarray]
+) -> None:
+    bag = tmp_path / "run"
+    words = ["--duration", str(DURATION), "--processes", processes, "--bag", str(bag)]
+    finished = _emir_run(words)
+    assert finished.returncode == 0, finished.stderr
+    assert "tcp_deflection_static" in finished.stdout
+    _assert_equal(bag, loop_signals)
+
+
+def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
+    files = []
+    for name in ("first", "second"):
+        bag = tmp_path / name / "run"  # the file's name stands in it
+        assert run_graph(["--duration", "2", "--bag", str(bag)]) == 0
+        files.append((bag / "run_0.mcap").read_bytes())
+    assert files[0] == files[1]
+
+
+def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    bag = tmp_path / "run"
+    assert run_graph(["--duration", "1", "--bag", str(bag)]) == 0
+    by_rosbags = _read_with_rosbags(bag)
+    with (bag / "run_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        counts: dict[str, int] = {}
+        for schema, channel, message, decoded in reader.iter_decoded_messages():
+            k = counts.get(channel.topic, 0)
+            counts[channel.topic] = k + 1
+            topic = by_name(channel.topic[1:])
+            log_time, other = by_rosbags[channel.topic][k]
+            assert schema.encoding == "ros2msg"
+            assert schema.name == topic.type
+            assert channel.message_encoding == "cdr"
+            assert message.log_time == log_time
+            assert conversions.values(topic, decoded) == conversions.values(topic, other)
+            assert {"offered_qos_profiles", "topic_type_hash"} <= channel.metadata.keys()
+        stored = {record.name: record.metadata for record in reader.iter_metadata()}
+    assert counts == {topic: len(messages) for topic, messages in by_rosbags.items()}
+    text = (bag / "metadata.yaml").read_text()
+    assert stored["rosbag2"]["serialized_metadata"] == text
+    assert not re.search(r"[&*]id\d", text)  # rosbag2 writes no anchors
+    info = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    assert info["version"] == 9
+    assert info["message_count"] == sum(counts.values())
+    assert info["duration"]["nanoseconds"] == 1_000_000_000 - 1_000_000_000 % CONTROL_PERIOD_NS
+    with AnyReader([bag]) as opened:
+        for connection in opened.connections:
+            (profile,) = connection.ext.offered_qos_profiles
+            assert profile.reliability is QosReliability.RELIABLE
+
+
+def test_schema_text_is_the_one_that_ros_distributes(tmp_path: Path) -> None:
+    """rosbags keeps its own copy of ROS 2's definitions and gives them a type hash."""
+    from emir_ros.message_definitions import definition, type_hash
+    from rosbags.typesys import Stores, get_typestore, get_types_from_msg
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name in {topic.type for topic in TOPICS} | {"geometry_msgs/msg/PoseStamped"}:
+        parsed = get_types_from_msg(definition(name), name)
+        assert name in parsed
+        for inner, fields in parsed.items():
+            assert fields == store.fielddefs[inner], inner
+        assert type_hash(name) == store.hash_rihs01(name)
+
+
+def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
+    bag = tmp_path / "run"
+    finished = _emir_run(["--realtime", "--duration", "3", "--bag", str(bag)])
+    assert finished.returncode == 0, finished.stderr
+    recorded = _read_with_rosbags(bag)
+    stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
+    assert len(stroke) > 300  # of 375: the machine may be busy
+    periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
+    assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)
+    strokes = [conversions.values(by_name("truth"), m)["true_stroke"] for _, m in recorded["/truth"]]
+    assert strokes[-1] - strokes[0] > 0.005  # it has begun to lift
+
+
+@pytest.mark.parametrize("victim", ["cascade_node", "recorder_node", "plant_node"])
+def test_a_killed_node_is_noticed_and_the_recording_stays_readable(
+    victim: str, tmp_path: Path
+) -> None:
+    bag = tmp_path / "run"
+    words = ["--duration", "600", "--processes", "many", "--bag", str(bag)]
+    with _started(words) as process:
+        _wait_until(lambda: _size(bag / "run_0.mcap") > 300_000, process)
+        os.kill(_child(process.pid, victim), signal.SIGKILL)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert f"emir run: {victim} was killed by SIGKILL before the run was over" in errors
+    assert "Traceback" not in errors
+    from emir_analysis.run_signals import load_run
+
+    recording = load_run(bag)
+    assert recording["stroke"].time[-1] > 1.0
+    if victim != "recorder_node":
+        assert _read_with_rosbags(bag).keys() == {f"/{topic.name}" for topic in TOPICS}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("processes", ["one", "many"])
+def test_an_interrupted_run_keeps_what_it_has(
+    number: signal.Signals, processes: str, tmp_path: Path
+) -> None:
+    bag = tmp_path / "run"
+    with _started(["--duration", "600", "--processes", processes, "--bag", str(bag)]) as process:
+        _wait_until(lambda: _size(bag / "run_0.mcap") > 300_000, process)
+        process.send_signal(number)
+        out, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.rstrip().endswith("emir run: interrupted")
+    assert "tracking_error_rms" in out
+    assert _read_with_rosbags(bag).keys() == {f"/{topic.name}" for topic in TOPICS}
+
+
+BAD = {
+    "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
+    "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
+    "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
+    "range": ([], "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}", "valve.dead_zone = 2"),
+    "type": ([], "cascade_node: {ros__parameters: {gain: high}}", "gain = 'high': not of type"),
+    "unknown": ([], "plant_node: {ros__parameters: {valve: {zone: 0.1}}}", "valve.zone: there is no"),
+    "node": ([], "crane: {ros__parameters: {}}", "crane: no such node; there are"),
+    "form": ([], "plant_node: {valve: 1}", "plant_node: ros__parameters is missing"),
+    "angle": (
+        [],
+        "plant_node: {ros__parameters: {initial_angle: 0.0, supply: {p0: 5.0e6}}}",
+        "the boom needs",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_clear_line(
+    case: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words, parameters, said = BAD[case]
+    bag = tmp_path / "run"
+    if parameters:
+        file = tmp_path / "params.yaml"
+        file.write_text(parameters)
+        words = [*words, "--params", str(file)]
+    assert run_graph([*words, "--bag", str(bag)]) == 1
+    captured = capfd.readouterr()
+    assert said in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
+    assert not bag.exists()
+
+
+def test_a_recording_is_never_overwritten(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "precious").write_text("data")
+    assert run_graph(["--bag", str(tmp_path)]) == 1
+    assert "exists already" in capfd.readouterr().err
+    with pytest.raises(ValueError, match="exists already"):
+        Rosbag2Writer(tmp_path)
+    assert (tmp_path / "precious").read_text() == "data"
+
+
+def test_parameters_reach_the_nodes(tmp_path: Path) -> None:
+    """A machine with friction and a smaller move, set from one ROS 2 parameter file."""
+    file, bag = tmp_path / "params.yaml", tmp_path / "run"
+    file.write_text(
+        "plant_node:\n  ros__parameters:\n    effects.coulomb_friction.force: 20000.0\n"
+        "trajectory_node:\n  ros__parameters: {distance: 0.01, ramp: 0.2, delay: 0.5, pause: 0.5}\n"
+    )
+    plan = Plan(bag=bag, params=file)
+    assert duration(plan) == pytest.approx(0.5 + 2 * (0.01 / 0.025 + 0.2 + 0.5))
+    with ros_arguments(plan) as arguments:
+        from emir_ros.plant_node import PlantNode
+
+        rclpy.init()
+        node = PlantNode(arguments)
+        assert node.plant.machine.effects.coulomb_friction.force == 20000.0
+        assert node.own.duration == pytest.approx(duration(plan))
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+def test_plant_says_which_answer_it_waits_for(tmp_path: Path) -> None:
+    words = ["--ros-args", "-p", "lockstep:=true", "-p", "patience:=0.5"]
+    command = [sys.executable, "-m", "emir_ros.plant_node", *words]
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert finished.returncode == 1
+    assert "plant_node: no valve_command for t = 0.000 s within 0.5 s" in finished.stderr
+    assert "Traceback" not in finished.stderr
+
+
+# helpers
+
+
+def _emir_run(words: list[str]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "emir_analysis.cli", "run", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+class _started:  # noqa: N801 (used like a function)
+    """`emir run` in the background; killed with its children when the test leaves it alive."""
+
+    def __init__(self, words: list[str]) -> None:
+        command = [sys.executable, "-m", "emir_ros.run", *words]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def __enter__(self) -> subprocess.Popen[str]:
+        return self.process
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.communicate()
+
+
+def _children(pid: int) -> Iterator[int]:
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        yield from map(int, (task / "children").read_text().split())
+
+
+def _child(parent: int, node: str) -> int:
+    for pid in _children(parent):
+        if f"emir_ros.{node}" in Path(f"/proc/{pid}/cmdline").read_text():
+            return pid
+    pytest.fail(f"{node} is not running")
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.exists() else 0
+
+
+def _wait_until(condition: object, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not condition():  # type: ignore[operator]
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline, "the run does not get on"

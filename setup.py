@@ -38,9 +38,9 @@ setup(
         "mcap-ros2-support>=0.5",
         "numba>=0.59",
         "numpy>=1.26",
-        "pyyaml>=6.0",
+        "pyyaml>=6.0.1",
         "rich>=13.0",
-        "scipy>=1.11",
+        "scipy>=1.12",
     ],
     extras_require={
         # ROS 2 Jazzy without an installation of ROS; not wanted where a Jazzy is sourced.

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (InputError, ParameterError) as error:
         return _complain(f"emir {words[0]}", str(error))
     except BrokenPipeError:  # whoever read our output has seen enough
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (lives until the end)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
         return 130

@@ -70,7 +70,7 @@ def lag_stroke(run: Recording) -> float | None:
 
 
 def lag_plateau(run: Recording) -> float | None:
-    """Delay of the stroke behind the reference at the end of each stretch of constant velocity, mean."""
+    """Delay of the stroke behind the reference where its velocity has been constant."""
     velocity = run["reference_velocity"]
     top = np.max(np.abs(velocity.value))
     settled = np.flatnonzero(np.abs(velocity.value) > 0.999 * top)  # of all moves

@@ -38,7 +38,9 @@ def text(run: RunAnalysis) -> str:
     """Return the figures as lines of text."""
     rows = [(m.name, *_shown(m), m.meaning) for m in run.metrics]
     wide = max(len(row[0]) for row in rows)
-    lines = [f"  {name:{wide}}  {value:>9} {unit:4} {meaning}" for name, value, unit, meaning in rows]
+    lines = [
+        f"  {name:{wide}}  {value:>9} {unit:4} {meaning}" for name, value, unit, meaning in rows
+    ]
     return "\n".join([f"figures of {run.bag}:", *lines])
 
 
@@ -97,10 +99,10 @@ def _headline(run: RunAnalysis) -> str:
 def _motion(run: Recording) -> Figure:
     figure = new_figure(7.0)
     stroke, velocity, tcp = figure.subplots(3, 1, sharex=True)
-    _line(stroke, run, "reference_stroke", 1e3, "wanted", "0.5")
+    _line(stroke, run, "reference_stroke", 1e3, "wanted")
     _line(stroke, run, "true_stroke" if "true_stroke" in run.signals else "stroke", 1e3, "piston")
     stroke.set_ylabel("stroke / mm")
-    _line(velocity, run, "reference_velocity", 1e3, "wanted", "0.5")
+    _line(velocity, run, "reference_velocity", 1e3, "wanted")
     _line(velocity, run, "true_velocity", 1e3, "piston")
     velocity.set_ylabel("velocity / mm/s")
     _line(tcp, run, "tcp_deflection", 1e2, "TCP off the straight boom")
@@ -112,19 +114,20 @@ def _hydraulics(run: Recording) -> Figure:
     figure = new_figure(6.0)
     valve, pressure, logic = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1))
     _line(valve, run, "valve_command", 100.0, "command y2")
+    valve.lines[-1].set_drawstyle("steps-post")  # held from one message to the next
     valve.set_ylabel("valve / %")
     _line(pressure, run, "pressure_lifting", 1e-5, "lifting chamber")
     _line(pressure, run, "pressure_lowering", 1e-5, "lowering chamber")
     pressure.set_ylabel("pressure / bar")
     _line(logic, run, "logic_block", 100.0, "logic block y4")
     logic.set_ylabel("open / %")
+    logic.set_ylim(-5.0, 105.0)
     return _finished(figure)
 
 
-def _line(
-    axes: Axes, run: Recording, name: str, factor: float, label: str, color: str | None = None
-) -> None:
+def _line(axes: Axes, run: Recording, name: str, factor: float, label: str) -> None:
     if name in run.signals:
+        color = "0.5" if name.startswith("reference") else None
         axes.plot(run[name].time, run[name].value * factor, label=label, color=color, lw=1.2)
 
 
@@ -132,6 +135,12 @@ def _finished(figure: Figure) -> Figure:
     for axes in figure.axes:
         axes.grid(visible=True, alpha=0.3)
         if axes.lines:
-            axes.legend(loc="upper right", fontsize="small")
+            axes.legend(
+                loc="lower right",
+                bbox_to_anchor=(1.0, 0.98),  # above the axes, where nothing is hidden
+                ncols=len(axes.lines),
+                frameon=False,
+                fontsize="small",
+            )
     figure.axes[-1].set_xlabel("time / s")
     return figure

@@ -30,7 +30,7 @@ def load_run(path: Path) -> Recording:
     Raises InputError for a recording that lacks a topic of the graph.
     """
     there = bags.recorded_topics(path)
-    sources = {}
+    sources: dict[str, Source] = {}
     for topic in (*NEEDED, *OPTIONAL):
         name = _full_name(topic, there)
         if name is not None:

@@ -1,5 +1,6 @@
 """Desired piston motion: trapezoidal velocity profiles and their integral."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,7 +28,7 @@ class Trapezoid:
 
     @property
     def _ramp_time(self) -> float:
-        return min(self.ramp, (abs(self.distance) * self.ramp / self.speed) ** 0.5)
+        return min(self.ramp, math.sqrt(abs(self.distance) * self.ramp / self.speed))
 
     @property
     def duration(self) -> float:

@@ -42,32 +42,62 @@ class Topic:
     frame: str = ""
 
 
-def _named_numbers(name: str, publisher: str, every: Literal["plant", "control"],
-                   units: dict[str, str]) -> Topic:
+def _named_numbers(
+    name: str, publisher: str, every: Literal["plant", "control"], units: dict[str, str]
+) -> Topic:
     fields = {key: Field(f"position[{i}]", unit) for i, (key, unit) in enumerate(units.items())}
     return Topic(name, JOINT_STATE, publisher, every, "sensor", fields, tuple(units))
 
 
 JOINT_STATES = Topic(
-    "joint_states", JOINT_STATE, "plant_node", "plant", "sensor",
-    {"angle": Field("position[0]", "rad")}, ("joint1",), "base_link",
+    "joint_states",
+    JOINT_STATE,
+    "plant_node",
+    "plant",
+    "sensor",
+    {"angle": Field("position[0]", "rad")},
+    ("joint1",),
+    "base_link",
 )
 CYLINDER_STATES = Topic(
-    "cylinder_states", JOINT_STATE, "plant_node", "plant", "sensor",
+    "cylinder_states",
+    JOINT_STATE,
+    "plant_node",
+    "plant",
+    "sensor",
     {"stroke": Field("position[0]", "m"), "force": Field("effort[0]", "N")},
-    ("cylinder1",), "cylinder1",
+    ("cylinder1",),
+    "cylinder1",
 )
 PRESSURE_LIFTING = Topic(
-    "pressure_lifting", FLUID_PRESSURE, "plant_node", "plant", "sensor",
-    {"pressure_lifting": Field("fluid_pressure", "Pa")}, (), "cylinder1",
+    "pressure_lifting",
+    FLUID_PRESSURE,
+    "plant_node",
+    "plant",
+    "sensor",
+    {"pressure_lifting": Field("fluid_pressure", "Pa")},
+    (),
+    "cylinder1",
 )
 PRESSURE_LOWERING = Topic(
-    "pressure_lowering", FLUID_PRESSURE, "plant_node", "plant", "sensor",
-    {"pressure_lowering": Field("fluid_pressure", "Pa")}, (), "cylinder1",
+    "pressure_lowering",
+    FLUID_PRESSURE,
+    "plant_node",
+    "plant",
+    "sensor",
+    {"pressure_lowering": Field("fluid_pressure", "Pa")},
+    (),
+    "cylinder1",
 )
 BOOM_DEFLECTION = Topic(
-    "boom_deflection", JOINT_STATE, "plant_node", "plant", "sensor",
-    {"deflection": Field("position[0]", "rad")}, ("boom_tip",), "boom1",
+    "boom_deflection",
+    JOINT_STATE,
+    "plant_node",
+    "plant",
+    "sensor",
+    {"deflection": Field("position[0]", "rad")},
+    ("boom_tip",),
+    "boom1",
 )
 TRUTH = _named_numbers(
     "truth", "plant_node", "plant",
@@ -79,25 +109,48 @@ TRUTH = _named_numbers(
     },
 )  # fmt: skip
 CYLINDER_REFERENCE = Topic(
-    "cylinder_reference", JOINT_STATE, "trajectory_node", "control", "command",
-    {"reference_stroke": Field("position[0]", "m"),
-     "reference_velocity": Field("velocity[0]", "m/s")},
-    ("cylinder1",), "cylinder1",
+    "cylinder_reference",
+    JOINT_STATE,
+    "trajectory_node",
+    "control",
+    "command",
+    {
+        "reference_stroke": Field("position[0]", "m"),
+        "reference_velocity": Field("velocity[0]", "m/s"),
+    },
+    ("cylinder1",),
+    "cylinder1",
 )
 VELOCITY_COMMAND = Topic(
-    "velocity_command", JOINT_STATE, "cascade_node", "control", "command",
-    {"velocity_command": Field("velocity[0]", "m/s")}, ("cylinder1",), "cylinder1",
+    "velocity_command",
+    JOINT_STATE,
+    "cascade_node",
+    "control",
+    "command",
+    {"velocity_command": Field("velocity[0]", "m/s")},
+    ("cylinder1",),
+    "cylinder1",
 )
 VALVE_COMMAND = Topic(
-    "valve_command", JOINT_STATE, "force_loop_node", "control", "command",
-    {"valve_command": Field("position[0]", "1")}, ("valve1",), "cylinder1",
+    "valve_command",
+    JOINT_STATE,
+    "force_loop_node",
+    "control",
+    "command",
+    {"valve_command": Field("position[0]", "1")},
+    ("valve1",),
+    "cylinder1",
 )
 CASCADE_TERMS = _named_numbers(
-    "cascade/terms", "cascade_node", "control",
+    "cascade/terms",
+    "cascade_node",
+    "control",
     {"feedforward": "m/s", "feedback": "m/s", "smoothed_reference": "m"},
 )
 FORCE_LOOP_TERMS = _named_numbers(
-    "force_loop/terms", "force_loop_node", "control",
+    "force_loop/terms",
+    "force_loop_node",
+    "control",
     {"measured_force": "N", "force_feedback": "m/s", "wanted_velocity": "m/s", "saturated": "1"},
 )
 

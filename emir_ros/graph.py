@@ -51,7 +51,9 @@ def check(plan: Plan) -> None:
         raise ParameterError(f"duration = {plan.duration:g} s: has to be positive")
     for node in read_parameters(plan.params):
         if node not in (*NODES, EVERY_NODE):
-            raise ParameterError(f"{plan.params}: {node}: no such node; there are {', '.join(NODES)}")
+            raise ParameterError(
+                f"{plan.params}: {node}: no such node; there are {', '.join(NODES)}"
+            )
     duration(plan)
 
 

@@ -12,7 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
-from emir_ros.shell import NodeFailure, Shell
+from emir_ros.shell import NodeError, Shell
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -41,7 +41,7 @@ def start_ros() -> StopRequest:
     return StopRequest()
 
 
-def make_executor(lockstep: bool) -> Any:
+def make_executor(*, lockstep: bool) -> Any:
     """Return the executor to spin with `spin_once`: lock step takes the faster, newer one."""
     return EventsExecutor() if lockstep else SingleThreadedExecutor()
 
@@ -59,13 +59,13 @@ def _run(node_class: Callable[[], Shell]) -> int:
     try:
         stop = start_ros()
         node = node_class()
-        executor = make_executor(node.lockstep)
+        executor = make_executor(lockstep=node.lockstep)
         executor.add_node(node)
         while not (stop.made or node.done):
             executor.spin_once(timeout_sec=0.1)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except (ParameterError, NodeFailure, SimulationError) as error:
+    except (ParameterError, NodeError, SimulationError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     finally:

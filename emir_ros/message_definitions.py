@@ -47,9 +47,9 @@ def _text(package: str, name: str) -> str:
 def _contained(package: str, name: str) -> list[tuple[str, str]]:
     found = []
     for line in _text(package, name).splitlines():
-        words = line.split("#")[0].split()
-        if len(words) < 2 or BUILTIN.match(words[0]):
+        kind, _, name_of_field = line.split("#")[0].strip().partition(" ")
+        if not name_of_field or BUILTIN.match(kind):
             continue
-        owner, _, inner = words[0].split("[")[0].rpartition("/")
+        owner, _, inner = kind.split("[")[0].rpartition("/")
         found.append((owner or package, inner))
     return found

@@ -32,7 +32,7 @@ from emir_plant.sheet import joint1, load_sheet
 from emir_ros import qos
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
-from emir_ros.shell import NodeFailure, Shell
+from emir_ros.shell import NodeError, Shell
 
 OUTPUTS = [
     JOINT_STATES,
@@ -85,7 +85,7 @@ class PlantNode(Shell):
         self._said = time.monotonic()
         self._command: tuple[int, float] | None = None
         self._recorded = -1
-        profile = qos.requested(VALVE_COMMAND, self.lockstep)
+        profile = qos.requested(VALVE_COMMAND, lockstep=self.lockstep)
         kind = conversions.message_class(VALVE_COMMAND.type)
         self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile)
         if self.lockstep:
@@ -116,7 +116,9 @@ class PlantNode(Shell):
     # lock step: publish stamp t, wait for the answers to t, step to the next control period
 
     def _start_lockstep(self) -> None:
-        self._clock = self.create_publisher(ClockMessage, "/clock", qos.offered(lockstep=True))
+        self._clock_publisher = self.create_publisher(
+            ClockMessage, "/clock", qos.offered(lockstep=True)
+        )
         self.create_subscription(Header, RECORDED, self._on_recorded, qos.offered(lockstep=True))
         self.create_timer(0.5, self._check_patience, clock=self._wall)
         self._asked = time.monotonic()
@@ -126,7 +128,7 @@ class PlantNode(Shell):
         stamp = self.tick * PLANT_PERIOD_NS
         clock = ClockMessage()
         clock.clock.sec, clock.clock.nanosec = divmod(stamp, conversions.NANOSECONDS)
-        self._clock.publish(clock)
+        self._clock_publisher.publish(clock)
         self._publish_sensors(stamp)
 
     def _on_recorded(self, message: Header) -> None:
@@ -155,7 +157,7 @@ class PlantNode(Shell):
         now = self.tick * PLANT_PERIOD_NS
         answered = self._command is not None and self._command[0] == now
         what = RECORDED if answered else VALVE_COMMAND.name
-        raise NodeFailure(
+        raise NodeError(
             f"plant_node: no {what} for t = {now * 1e-9:.3f} s within {self.own.patience:g} s:"
             f" is {'recorder_node' if answered else VALVE_COMMAND.publisher} (and what it"
             " listens to) running?"

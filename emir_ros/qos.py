@@ -16,7 +16,7 @@ DEPTH = 64  # plant periods: half a second of sensor data
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # how rosbag2 writes "no limit"
 
 
-def offered(lockstep: bool) -> QoSProfile:
+def offered(*, lockstep: bool) -> QoSProfile:
     """Return what every publisher of the graph offers.
 
     Reliable, so that it suits best-effort and reliable readers. In lock step also transient
@@ -31,9 +31,9 @@ def offered(lockstep: bool) -> QoSProfile:
     )
 
 
-def requested(topic: Topic, lockstep: bool) -> QoSProfile:
+def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:
     """Return what a control node asks for: fresh sensor data or every command."""
-    profile = offered(lockstep)
+    profile = offered(lockstep=lockstep)
     if topic.quality == "sensor" and not lockstep:
         profile.reliability = ReliabilityPolicy.BEST_EFFORT
     return profile

@@ -47,7 +47,7 @@ class RecorderNode(Shell):
         self._topics = [_known(name) for name in names]
         self._writer = Rosbag2Writer(Path(folder))
         self._writer.add_metadata("emir", json.loads(about))
-        self._ack = self.create_publisher(Header, RECORDED, qos.offered(self.lockstep))
+        self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
@@ -66,7 +66,7 @@ class RecorderNode(Shell):
 
     def _record(self, topic: Topic) -> None:
         full_name = self.resolve_topic_name(topic.name)
-        profile = qos.offered(self.lockstep)
+        profile = qos.offered(lockstep=self.lockstep)
         self._writer.add_topic(full_name, topic.type, [qos.as_rosbag2(profile)])
 
         def receive(data: bytes) -> None:

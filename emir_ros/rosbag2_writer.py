@@ -2,7 +2,6 @@
 
 import shutil
 from dataclasses import dataclass
-
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self

@@ -19,7 +19,7 @@ from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, Plan, check, ros_arguments
 from emir_ros.main import make_executor, start_ros
-from emir_ros.shell import NodeFailure, Shell
+from emir_ros.shell import NodeError, Shell
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
 GRACE = 10.0  # s that a node has to end before it is killed
@@ -74,7 +74,7 @@ def _run(plan: Plan, processes: str) -> int:
     except ParameterError as error:
         where = f"{plan.params}: " if plan.params else ""
         return _complain(f"{where}{error}", 1)
-    except (NodeFailure, SimulationError) as error:
+    except (NodeError, SimulationError) as error:
         return _complain(str(error), 1)
     return 0
 
@@ -83,7 +83,7 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
     stop = start_ros()
     nodes: dict[str, Shell] = {}
     try:
-        executor = make_executor(plan.lockstep)
+        executor = make_executor(lockstep=plan.lockstep)
         for name in plan.nodes:
             nodes[name] = _node_class(name)(ros)
             executor.add_node(nodes[name])
@@ -129,7 +129,7 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
 
 
 def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:
-    """Return when the plant has run to its end; raises NodeFailure when a node died before."""
+    """Return when the plant has run to its end; raises NodeError when a node died before."""
     while True:
         for name, process in processes.items():
             code = process.poll()
@@ -138,7 +138,7 @@ def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:
             if name == "plant_node" and code == 0:
                 return
             how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended ({code})"
-            raise NodeFailure(f"{name} {how} before the run was over")
+            raise NodeError(f"{name} {how} before the run was over")
         time.sleep(0.02)
 
 

@@ -6,21 +6,23 @@ runs as fast as it can and the result does not depend on how fast that is.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.time import Time
 
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
 from emir_ros import qos
 from emir_ros.node_parameters import declare
 
+if TYPE_CHECKING:
+    from rclpy.time import Time
+
 Signals = dict[str, float]
 
 
-class NodeFailure(RuntimeError):
+class NodeError(RuntimeError):
     """A node cannot go on; the message is one line."""
 
 
@@ -42,7 +44,7 @@ class Shell(Node):
 
     def _publisher(self, type_name: str, name: str) -> Any:
         kind = conversions.message_class(type_name)
-        return self.create_publisher(kind, name, qos.offered(self.lockstep))
+        return self.create_publisher(kind, name, qos.offered(lockstep=self.lockstep))
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
@@ -95,7 +97,7 @@ class ControlNode(Shell):
                 self._latest[topic.name] = (self.get_clock().now(), signals)
 
         kind = conversions.message_class(topic.type)
-        profile = qos.requested(topic, self.lockstep)
+        profile = qos.requested(topic, lockstep=self.lockstep)
         self.create_subscription(kind, topic.name, receive, profile)
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:

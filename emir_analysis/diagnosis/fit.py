@@ -16,10 +16,14 @@ Model = Callable[[Array], Array]  # (m, k) vectors -> (m, n) residuals in units 
 
 @dataclass(frozen=True)
 class Solution:
-    """x: (k,). spread: (k,) standard deviations from the curvature at the optimum."""
+    """x: (k,). spread: (k,) standard deviations from the curvature at the optimum.
+
+    evaluations: of the model, beside those for the Jacobian.
+    """
 
     x: Array
     spread: Array
+    evaluations: int
 
 
 def fit(
@@ -28,6 +32,7 @@ def fit(
     bounds: tuple[Array, Array],
     stated: Array,
     robust: bool = False,
+    accuracy: float = 1e-6,
     evaluations: int = 30,
 ) -> Solution:
     """Minimise the squared residuals of a model inside bounds.
@@ -57,11 +62,11 @@ def fit(
         jac=jacobian,
         bounds=bounds,
         loss="soft_l1" if robust else "linear",
-        xtol=1e-6,
-        ftol=1e-6,
+        xtol=accuracy,
+        ftol=accuracy,
         max_nfev=evaluations,
     )
     inverse = np.linalg.pinv(result.jac.T @ result.jac)
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
-    return Solution(result.x, np.sqrt(np.diag(inverse) * excess))
+    return Solution(result.x, np.sqrt(np.diag(inverse) * excess), result.nfev)

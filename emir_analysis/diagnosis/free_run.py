@@ -30,25 +30,25 @@ def free_runs(
     rest there gives NaN.
     """
     plants = [Plant(machine) for machine in machines]
-    states, alive = [], []
-    for plant, (angle, pressure) in zip(plants, starts, strict=True):
-        try:
-            states.append(plant.initial(angle, max(pressure, 0.0)))
-            alive.append(True)
-        except SimulationError:
-            states.append(np.zeros_like(states[0]) if states else None)
-            alive.append(False)
+    states = [_at_rest(plant, *start) for plant, start in zip(plants, starts, strict=True)]
+    able = [k for k, state in enumerate(states) if state is not None]
     result = np.full((len(plants), experiment.angle.size, len(Truth._fields)), np.nan)
-    living = np.flatnonzero(alive)
-    if living.size:
-        result[living] = core.simulate_many(
-            np.array([states[k] for k in living]),
+    if able:
+        result[able] = core.simulate_many(
+            np.array([states[k] for k in able]),
             experiment.commands,
             COMMAND_STEP,
             experiment.every,
-            np.concatenate([plants[k].record for k in living]),
+            np.concatenate([plants[k].record for k in able]),
         )
     return result
+
+
+def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | None:
+    try:
+        return plant.initial(angle, max(pressure_lowering, 0.0))
+    except SimulationError:
+        return None
 
 
 def free_run(machine: Machine, experiment: Experiment) -> Array:

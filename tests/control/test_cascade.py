@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import signal
+
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.trajectory import Reference
-from scipy import signal
 
 DT = 0.032
 CASCADE = Cascade(CascadeParameters(gain=2.0, time_constant=0.4))

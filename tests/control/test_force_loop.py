@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from emir_control.force_loop import (
     ForceLoop,
     ForceLoopInputs,

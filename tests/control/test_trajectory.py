@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from emir_common.quantity import ParameterError
-from emir_control.trajectory import Trapezoid, TrajectoryInputs, TrajectoryParameters, named
 from scipy.integrate import cumulative_simpson
+
+from emir_common.quantity import ParameterError
+from emir_control.trajectory import TrajectoryInputs, TrajectoryParameters, Trapezoid, named
 
 CASES = [Trapezoid(0.06375, 0.025, 0.75), Trapezoid(-0.2, 0.05, 0.4), Trapezoid(0.002, 0.025, 0.75)]
 

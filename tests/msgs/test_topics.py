@@ -3,6 +3,7 @@
 from collections import Counter
 
 import pytest
+
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import TOPICS, TRUTH, Topic, by_name
 from emir_plant.core import Truth

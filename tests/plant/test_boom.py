@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from emir_plant import core
 from emir_plant.boom import boom_modes, section_model
 from emir_plant.linearize import linearize

@@ -1,10 +1,12 @@
 """What every effect has to satisfy, whichever it is."""
 
+import itertools
 import math
 from dataclasses import fields
 
 import numpy as np
 import pytest
+
 from emir_common.parameter_tree import with_values
 from emir_plant import core
 from emir_plant.effects import REGISTRY, entrained_air, terms
@@ -98,7 +100,7 @@ def test_leakage_lets_the_boom_sink() -> None:
 def test_air_softens_at_low_pressure_and_is_gone_at_high() -> None:
     oil = Plant(_switched_on("entrained_air")).record[0]
     soft = [entrained_air.stiffness(p, oil) for p in np.geomspace(1e5, 1e9, 30)]
-    assert all(a <= b for a, b in zip(soft[:-1], soft[1:], strict=True))
+    assert all(a <= b for a, b in itertools.pairwise(soft))
     assert soft[-1] == pytest.approx(oil["beta"], rel=1e-3)
     # bubbles alone: p n / a at 1 bar, in series with the oil
     share, n = oil["entrained_air_share"], oil["entrained_air_exponent"]
@@ -108,9 +110,10 @@ def test_air_softens_at_low_pressure_and_is_gone_at_high() -> None:
 
 def test_payload_is_felt_as_weight_and_inertia() -> None:
     plain, loaded = Plant(joint1()), Plant(_switched_on("payload"))
-    extra = loaded.outputs(loaded.initial(FORTY_FIVE)).force - plain.outputs(
-        plain.initial(FORTY_FIVE)
-    ).force
+    extra = (
+        loaded.outputs(loaded.initial(FORTY_FIVE)).force
+        - plain.outputs(plain.initial(FORTY_FIVE)).force
+    )
     from emir_plant import linkage
 
     moment = 100.0 * 9.81 * 22.5 * math.cos(FORTY_FIVE)

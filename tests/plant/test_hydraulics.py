@@ -1,9 +1,11 @@
 """Valve, flow paths and logic block in their limit cases."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+
 from emir_common.parameter_tree import with_values
 from emir_plant import linkage
 from emir_plant.hydraulics import logic_block, valve
@@ -49,7 +51,7 @@ def test_pump_delivers_nothing_against_a_higher_pressure() -> None:
     assert pump_flow(1.0, nominal, P["p0"], P) == 0.0
     assert pump_flow(1.0, nominal, P["p0"] + 50 * BAR, P) == 0.0  # check valve
     falling = [pump_flow(1.0, nominal, p, P) for p in np.linspace(0, 200, 41) * BAR]
-    assert all(a >= b for a, b in zip(falling[:-1], falling[1:], strict=True))
+    assert all(a >= b for a, b in itertools.pairwise(falling))
 
 
 def test_return_flow_meets_the_series_of_resistances() -> None:

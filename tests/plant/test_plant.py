@@ -1,9 +1,12 @@
 """The integrated model against an independent solver, conservation of energy and the paper."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant import core, linkage
@@ -11,7 +14,6 @@ from emir_plant.core import Truth
 from emir_plant.linearize import linearize
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import joint1
-from scipy.integrate import solve_ivp
 
 FORTY_FIVE = math.radians(45.0)
 PLANT = Plant(joint1())
@@ -76,7 +78,7 @@ def test_pressures_agree_with_a_stiff_solver_to_1e_4(lowering: float) -> None:
     ours = PLANT.simulate(start, commands, 1e-3)
     state, reference = start, [start]
     edges = np.flatnonzero(np.diff(commands, prepend=np.nan, append=np.nan))
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in itertools.pairwise(edges):
         times = np.arange(begin, end + 1) * 1e-3
         solved = solve_ivp(
             lambda _t, x, y=commands[begin]: PLANT.derivative(x, y),

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure, resolver
 from emir_plant.sheet import joint1

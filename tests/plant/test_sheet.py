@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from emir_common.parameter_tree import declared
 from emir_common.quantity import ParameterError
 from emir_plant.sheet import joint1, load_sheet
@@ -23,7 +24,11 @@ def test_every_number_of_the_machine_has_a_source() -> None:
         ("beta: {value: 5.0e+8", "beta: {value: 5.0e+12", "cylinder.beta = 5e+12: outside 1e"),
         ("beta: {value: 5.0e+8", "beta: {value: .nan", "cylinder.beta = nan: outside 1e"),
         ("beta: {value: 5.0e+8", "beta: {value: soft", "cylinder.beta = 'soft': not a number"),
-        ("beta: {value: 5.0e+8, unit: Pa", "beta: {value: 5.0e+3, unit: bar", "in bar, expected Pa"),
+        (
+            "beta: {value: 5.0e+8, unit: Pa",
+            "beta: {value: 5.0e+3, unit: bar",
+            "in bar, expected Pa",
+        ),
         ("  beta:", "  betta:", "cylinder.betta: there is no such parameter"),
         ("cylinder:", "cylinder: [", "not YAML"),
     ],

@@ -17,6 +17,9 @@ import yaml
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import rclpy
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosReliability
+
 from emir_analysis.closed_loop import ClosedLoop
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py import conversions
@@ -24,10 +27,8 @@ from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TOPICS, by_n
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 from emir_ros.graph import Plan, duration, ros_arguments
-from emir_ros.run import main as run_graph
 from emir_ros.rosbag2_writer import Rosbag2Writer
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import QosReliability
+from emir_ros.run import main as run_graph
 
 DURATION = 4.8  # s: at rest, and into the plateau of the first move
 
@@ -122,8 +123,9 @@ def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
 
 def test_schema_text_is_the_one_that_ros_distributes(tmp_path: Path) -> None:
     """rosbags keeps its own copy of ROS 2's definitions and gives them a type hash."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
     from emir_ros.message_definitions import definition, type_hash
-    from rosbags.typesys import Stores, get_typestore, get_types_from_msg
 
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in {topic.type for topic in TOPICS} | {"geometry_msgs/msg/PoseStamped"}:
@@ -143,7 +145,9 @@ def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
     assert len(stroke) > 300  # of 375: the machine may be busy
     periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
     assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)
-    strokes = [conversions.values(by_name("truth"), m)["true_stroke"] for _, m in recorded["/truth"]]
+    strokes = [
+        conversions.values(by_name("truth"), m)["true_stroke"] for _, m in recorded["/truth"]
+    ]
     assert strokes[-1] - strokes[0] > 0.005  # it has begun to lift
 
 
@@ -188,9 +192,17 @@ BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
-    "range": ([], "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}", "valve.dead_zone = 2"),
+    "range": (
+        [],
+        "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}",
+        "valve.dead_zone = 2",
+    ),
     "type": ([], "cascade_node: {ros__parameters: {gain: high}}", "gain = 'high': not of type"),
-    "unknown": ([], "plant_node: {ros__parameters: {valve: {zone: 0.1}}}", "valve.zone: there is no"),
+    "unknown": (
+        [],
+        "plant_node: {ros__parameters: {valve: {zone: 0.1}}}",
+        "valve.zone: there is no",
+    ),
     "node": ([], "crane: {ros__parameters: {}}", "crane: no such node; there are"),
     "form": ([], "plant_node: {valve: 1}", "plant_node: ros__parameters is missing"),
     "angle": (

@@ -1,0 +1,89 @@
+"""Figures of a run against signals whose figures are known."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emir_analysis.errors import InputError
+from emir_analysis.metrics import metrics
+from emir_analysis.run_report import analyze, text, write_json, write_report
+from emir_analysis.run_signals import load_run
+from emir_analysis.signals import Recording, Signal
+
+LIFT = Path(__file__).parents[2] / "bags" / "lift"
+
+
+def _signal(name: str, unit: str, time: np.ndarray, value: np.ndarray) -> Signal:
+    return Signal(name, time, value, unit)
+
+
+def _run(delay: float, bending: float) -> Recording:
+    """A stroke that follows a ramp with a pure delay, and a TCP that swings with 0.7 Hz."""
+    control, plant = np.arange(0.0, 10.0, 0.032), np.arange(0.0, 10.0, 0.008)
+
+    def ramp(t: np.ndarray) -> np.ndarray:
+        return np.clip(t - 2.0, 0.0, 4.0) * 0.025 + 0.3
+
+    def speed(t: np.ndarray) -> np.ndarray:
+        return np.where((t > 2.0) & (t < 6.0), 0.025, 0.0)
+
+    swing = np.where(plant > 2.0, bending * np.sin(2 * math.pi * 0.7 * (plant - 2.0)), 0.0)
+    stroke = ramp(plant - delay)
+    signals = {
+        "reference_stroke": _signal("reference_stroke", "m", control, ramp(control)),
+        "reference_velocity": _signal("reference_velocity", "m/s", control, speed(control)),
+        "stroke": _signal("stroke", "m", plant, stroke),
+        "true_stroke": _signal("true_stroke", "m", plant, stroke),
+        "true_velocity": _signal("true_velocity", "m/s", plant, speed(plant - delay)),
+        "true_angle": _signal("true_angle", "rad", plant, stroke / 0.6),
+        "tcp_deflection": _signal("tcp_deflection", "m", plant, -0.18 + swing),
+        "pressure_lifting": _signal("pressure_lifting", "Pa", plant, 1e7 + 1e5 * swing),
+        "pressure_lowering": _signal("pressure_lowering", "Pa", plant, np.full(plant.size, 2e6)),
+        "valve_command": _signal("valve_command", "1", control, np.where(control > 5, 0.5, 0.0)),
+    }
+    return Recording(signals, 0)
+
+
+def test_figures_of_a_known_run() -> None:
+    found = {m.name: m.value for m in metrics(_run(delay=0.4, bending=0.05))}
+    assert found["tracking_error_peak"] == pytest.approx(0.025 * 0.4, rel=1e-6)
+    assert found["lag_velocity"] == pytest.approx(0.4, abs=0.02)
+    assert found["lag_stroke"] == pytest.approx(0.4, abs=0.002)
+    assert found["lag_plateau"] == pytest.approx(0.4, abs=1e-6)
+    assert found["tcp_deflection_static"] == pytest.approx(-0.18)
+    assert found["tcp_deflection_up"] == pytest.approx(0.05, rel=1e-3)
+    assert found["tcp_deflection_down"] == pytest.approx(-0.05, rel=1e-3)
+    # the stroke follows the delayed reference exactly: only the bending is left
+    assert found["tcp_error_up"] == pytest.approx(0.05, rel=1e-2)
+    assert found["pressure_lowering_peak"] == pytest.approx(2e6)
+    assert found["valve_travel"] == pytest.approx(0.5)
+
+
+def test_a_machine_without_truth_gets_the_figures_that_its_sensors_allow() -> None:
+    whole = _run(0.4, 0.05)
+    hidden = ("true", "tcp")
+    sensed = {n: s for n, s in whole.signals.items() if not n.startswith(hidden)}
+    found = {m.name: m.value for m in metrics(Recording(sensed, 0))}
+    assert found["lag_stroke"] == pytest.approx(0.4, abs=0.002)
+    assert found["tcp_deflection_static"] is None
+    assert found["lag_velocity"] is None
+
+
+def test_an_old_recording_is_read_and_reported(tmp_path: Path) -> None:
+    run = analyze(LIFT)
+    figures = {m.name: m.value for m in run.metrics}
+    assert figures["tcp_deflection_static"] == pytest.approx(-0.18, abs=0.01)  # paper 3.2
+    assert run.about["controller"] == "cascade"
+    assert "tcp_deflection_static" in text(run)
+    write_json(run, tmp_path / "figures.json")
+    write_report(run, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<img") == 2
+    assert "tracking_error_peak" in page
+
+
+def test_a_recording_of_something_else_is_refused(shared: Path) -> None:
+    with pytest.raises(InputError, match="no topic cylinder_states; there are /rig"):
+        load_run(shared / "recordings" / "elm_a")

@@ -49,10 +49,13 @@ def _complain(who: str, message: str) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """Hand over to the one package that knows ROS, in this same process."""
+    """Hand over to the one package that knows ROS, in this same process.
+
+    -P: what lies in the current folder is not imported.
+    """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-m", "emir_ros.run", *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
 
 
 def _analyze(words: list[str]) -> int:

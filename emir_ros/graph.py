@@ -120,7 +120,10 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
         "trajectory_node": {"trajectory": plan.trajectory},
         "recorder_node": {"bag": str(plan.bag), "description": json.dumps(_description(plan))},
     }
-    return {node: {"ros__parameters": values} for node, values in nodes.items()}
+    return {
+        node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
+        for node, values in nodes.items()
+    }
 
 
 def _description(plan: Plan) -> dict[str, str]:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from emir_plant import core
 from emir_plant.core import Array, Truth
 from emir_plant.plant import Plant
 
@@ -14,12 +16,15 @@ ROUNDING = 1e-6  # rad/s, below which the imaginary part of a pole is numerical 
 class LinearModel:
     """dx = A x + B u, y = C x, deviations from the operating point.
 
-    A: (n, n). B: (n, 1), input y2. C: (len(Truth), n), rows in the order of `Truth`.
+    A: (n, n). B: (n, 1), input y2 as it arrives at the valve. C: (len(Truth), n), rows in the
+    order of `Truth`. states: (n,) their indices in the plant's state; time and the memory of
+    effects are left out where nothing depends on them.
     """
 
     A: Array
     B: Array
     C: Array
+    states: NDArray[np.intp]
 
     def modes(self) -> tuple[Array, Array]:
         """Return frequency, Hz, and damping, of critical, of the oscillations, slowest first."""
@@ -48,4 +53,13 @@ def linearize(plant: Plant, state: Array, command: float = 0.0) -> LinearModel:
         C[:, k] = (outputs(ahead) - outputs(behind)) / width
     d = 1e-6
     B = (plant.derivative(state, command + d) - plant.derivative(state, command - d)) / (2.0 * d)
-    return LinearModel(A, B.reshape(-1, 1), C)
+    kept = _at_work(A, C)
+    return LinearModel(A[np.ix_(kept, kept)], B[kept, None], C[:, kept], kept)
+
+
+def _at_work(A: Array, C: Array) -> NDArray[np.intp]:
+    """Return the indices of the states without the memory on which nothing else depends."""
+    others = A - np.diag(np.diag(A))
+    needed = np.array(others.any(axis=0) | C.any(axis=0))
+    needed[: core.TIME] = needed[core.MODES :] = True
+    return np.flatnonzero(needed)

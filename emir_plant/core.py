@@ -116,13 +116,13 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
     That is the command y2 behind the delay line, on which only time and `advance` work.
     """
     dx = np.zeros_like(x)
-    _write_derivative(x, command, parameters, dx)
+    write_derivative(x, command, parameters, dx)
     return dx
 
 
 @compiled
-def _write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
-    """Write dx/dt to dx, (n,), all but the delay line's entries."""
+def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
+    """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
     p = parameters[0]
     motion = _motion(x, p)
     flow_lifting, flow_lowering, pumped = _valve_flows(x, p)
@@ -221,16 +221,16 @@ def _advance(x: Array, command: float, dt: float, parameters: NDArray[Any], work
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
-        _write_derivative(x, arriving, parameters, k1)
+        write_derivative(x, arriving, parameters, k1)
         for i in range(x.size):
             between[i] = x[i] + 0.5 * h * k1[i]
-        _write_derivative(between, arriving, parameters, k2)
+        write_derivative(between, arriving, parameters, k2)
         for i in range(x.size):
             between[i] = x[i] + 0.5 * h * k2[i]
-        _write_derivative(between, arriving, parameters, k3)
+        write_derivative(between, arriving, parameters, k3)
         for i in range(x.size):
             between[i] = x[i] + h * k3[i]
-        _write_derivative(between, arriving, parameters, k4)
+        write_derivative(between, arriving, parameters, k4)
         for i in range(x.size):
             x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         x[P_H] = max(x[P_H], 0.0)

@@ -17,8 +17,8 @@ class LinearModel:
     """dx = A x + B u, y = C x, deviations from the operating point.
 
     A: (n, n). B: (n, 1), input y2 as it arrives at the valve. C: (len(Truth), n), rows in the
-    order of `Truth`. states: (n,) their indices in the plant's state; time and the memory of
-    effects are left out where nothing depends on them.
+    order of `Truth`. states: (n,) their indices in the plant's state; left out are time and the
+    memory of effects that nothing drives or nothing feels.
     """
 
     A: Array
@@ -53,13 +53,15 @@ def linearize(plant: Plant, state: Array, command: float = 0.0) -> LinearModel:
         C[:, k] = (outputs(ahead) - outputs(behind)) / width
     d = 1e-6
     B = (plant.derivative(state, command + d) - plant.derivative(state, command - d)) / (2.0 * d)
-    kept = _at_work(A, C)
+    kept = _at_work(A, B, C)
     return LinearModel(A[np.ix_(kept, kept)], B[kept, None], C[:, kept], kept)
 
 
-def _at_work(A: Array, C: Array) -> NDArray[np.intp]:
-    """Return the indices of the states without the memory on which nothing else depends."""
+def _at_work(A: Array, B: Array, C: Array) -> NDArray[np.intp]:
+    """Return the indices of the states without the memory that nothing drives or nothing feels."""
     others = A - np.diag(np.diag(A))
-    needed = np.array(others.any(axis=0) | C.any(axis=0))
-    needed[: core.TIME] = needed[core.MODES :] = True
-    return np.flatnonzero(needed)
+    driven = others.any(axis=1) | (B != 0.0)
+    felt = others.any(axis=0) | C.any(axis=0)
+    memory = np.zeros(B.size, dtype=bool)
+    memory[core.TIME : core.MODES] = True
+    return np.flatnonzero(~memory | (driven & felt))

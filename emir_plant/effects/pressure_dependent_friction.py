@@ -19,7 +19,7 @@ class PressureDependentFriction(Effect):
     trial: ClassVar[dict[str, float]] = {"coefficient": 0.02}
 
     coefficient: float = quantity("1", 0.0, 0.2, "mu", default=0.0)
-    smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
+    smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=2e-3)
 
 
 @compiled

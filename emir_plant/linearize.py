@@ -53,15 +53,14 @@ def linearize(plant: Plant, state: Array, command: float = 0.0) -> LinearModel:
         C[:, k] = (outputs(ahead) - outputs(behind)) / width
     d = 1e-6
     B = (plant.derivative(state, command + d) - plant.derivative(state, command - d)) / (2.0 * d)
-    kept = _at_work(A, B, C)
-    return LinearModel(A[np.ix_(kept, kept)], B[kept, None], C[:, kept], kept)
+    return _without_idle_memory(LinearModel(A, B.reshape(-1, 1), C, np.arange(state.size)))
 
 
-def _at_work(A: Array, B: Array, C: Array) -> NDArray[np.intp]:
-    """Return the indices of the states without the memory that nothing drives or nothing feels."""
-    others = A - np.diag(np.diag(A))
-    driven = others.any(axis=1) | (B != 0.0)
-    felt = others.any(axis=0) | C.any(axis=0)
-    memory = np.zeros(B.size, dtype=bool)
-    memory[core.TIME : core.MODES] = True
-    return np.flatnonzero(~memory | (driven & felt))
+def _without_idle_memory(full: LinearModel) -> LinearModel:
+    """Return the model without the memory that nothing drives or nothing feels."""
+    others = full.A - np.diag(np.diag(full.A))
+    driven = others.any(axis=1) | full.B.any(axis=1)
+    felt = others.any(axis=0) | full.C.any(axis=0)
+    memory = (full.states >= core.TIME) & (full.states < core.MODES)
+    kept = np.flatnonzero(~memory | (driven & felt))
+    return LinearModel(full.A[np.ix_(kept, kept)], full.B[kept], full.C[:, kept], kept)

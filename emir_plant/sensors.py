@@ -128,6 +128,12 @@ def _distorted(true: Any, name: str, machine: Machine) -> Any:
     return true * (1.0 + getattr(gain, name)) + getattr(bias, name)
 
 
+def undistorted(shown: float, name: str, machine: Machine) -> float:
+    """Return what a sensor of a gain and a bias was given when it shows a value at rest."""
+    gain, bias = machine.effects.sensor_gain, machine.effects.sensor_bias
+    return float((shown - getattr(bias, name)) / (1.0 + getattr(gain, name)))
+
+
 def _lagged(signal: Array, lag: float, period: float) -> Array:
     """Return a signal, (n,), behind a first-order lag, s, exactly for straight pieces."""
     if lag == 0.0:

@@ -10,16 +10,19 @@ import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, Balances
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import Problem, Solution, fit
-from emir_analysis.diagnosis.free_run import free_runs, outputs
+from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
+from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
 ACCURACY = 1e-4  # relative, of the free run
 LINKAGE = list(BALANCES).index("linkage")
+MOST_FITTED = 8  # effects of a shortlist, which are then fitted to the balances
+FELT = 1e-6  # share of an effect's shift that no parameter can imitate, and that is rounding
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,40 @@ def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) ->
     return Trial(effects, members, x, np.full(x.size, np.nan))
 
 
+def shortlist(known: Trial, sheet: Sheet, balances: Balances, floor: Array) -> list[str]:
+    """Return the effects that could explain most of what a fitted trial leaves in the balances.
+
+    To first order: each effect at its trial value shifts the balances in a direction; what of it
+    no parameter can imitate takes away a share of the residual. Effects that are on already,
+    that cannot be simulated or that no balance feels are not in the list.
+    """
+    names = [name for name in REGISTRY if name not in known.effects]
+    fitted = known.unknowns.values(known.x)
+    machines = [known.machine, *(known.unknowns.at(x) for x in _neighbours(known))]
+    for name in names:
+        members = unknowns(sheet, (*known.effects, name))
+        machines.append(members.machine_with(members.values(members.start) | fitted))
+    speaking = np.arange(len(BALANCES)) != LINKAGE
+    missing = (balances.residuals(machines) / floor)[:, :, speaking].reshape(len(machines), -1)
+    shifts = missing[1:] - missing[0]
+    parameters, effects = shifts[: known.x.size], shifts[known.x.size :]
+    imitated, _ = np.linalg.qr(parameters.T)
+    left = missing[0] - imitated @ (imitated.T @ missing[0])
+    gains = {}
+    for name, shift in zip(names, effects, strict=True):
+        own = shift - imitated @ (imitated.T @ shift)
+        size = float(own @ own)
+        if np.isfinite(size) and size > FELT * float(shift @ shift):
+            gains[name] = float(own @ left) ** 2 / size
+    return sorted(gains, key=lambda name: -gains[name])[:MOST_FITTED]
+
+
+def _neighbours(trial: Trial) -> Array:
+    """Return the trial's vector with one entry changed a little in each row, (k, k)."""
+    _, high = trial.unknowns.bounds
+    return np.asarray(trial.x + np.diag(np.where(trial.x + STEP > high, -STEP, STEP)))
+
+
 def fit_balances(start: Trial, balances: Balances, floor: Array) -> Trial:
     """Fit a trial to the balances of a recording. floor: (5,) what the sensors leave in each."""
     speaking = np.arange(len(BALANCES)) != LINKAGE  # exact geometry: nothing to fit
@@ -80,12 +117,12 @@ def fit_free_run(start: Trial, experiment: Experiment, noise: Array) -> Trial:
     own = start.x.size
 
     def model(points: Array) -> Array:
-        truth = free_runs(
+        shown = free_runs(
             [start.unknowns.at(x[:own]) for x in points],
             experiment,
             [(angle + x[own] * step, pressure + x[own + 1] * noise[2]) for x in points],
         )
-        error = (outputs(truth) - experiment.outputs) / noise
+        error = (shown[:, :, 1:] - experiment.outputs) / noise
         return np.asarray(error.reshape(len(points), -1))
 
     low, high = start.unknowns.bounds

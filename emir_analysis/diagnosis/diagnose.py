@@ -11,6 +11,7 @@ from emir_analysis.diagnosis.candidates import (
     Trial,
     fit_balances,
     fit_free_run,
+    shortlist,
     trial,
 )
 from emir_analysis.diagnosis.experiment import COMMAND, OUTPUTS, Experiment, noise
@@ -28,9 +29,9 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.signals import Array
-from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
+AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 
@@ -142,11 +143,16 @@ def _search(
         return Tried(fitted, balance_score(fitted, balances, floor))
 
     best = screened((), None)
+    if quiet(rms(balances.residuals([best.trial.machine])[0]), floor):
+        best = simulated(best)
+        if np.all(rms(errors(best.trial.machine, experiment)) <= AT_NOISE * sensors):
+            return [best], [best.trial]  # nothing is left that an effect could explain
     tried = [best]
     equal = [best.trial]
     while len(best.trial.effects) < MOST_EFFECTS:
         known = best.trial if best.trial.effects else None
-        others = [name for name in REGISTRY if name not in best.trial.effects]
+        progress(f"shortlist beside: {best.trial.name}")
+        others = shortlist(best.trial, sheet, seen, floor)
         round_ = [screened((*best.trial.effects, name), known) for name in others]
         promising = sorted(
             (t for t in round_ if t.balances < best.balances - STRONG), key=lambda t: t.balances

@@ -1,6 +1,5 @@
 """What a fit may change: the toleranced parameters and the parameters of effects, as a vector."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine, groups
@@ -76,7 +76,11 @@ class Unknowns:
 
     def at(self, x: Array) -> Machine:
         """Return the machine with the parameters at x."""
-        return with_values(self.machine, self.values(x))
+        return self.machine_with(self.values(x))
+
+    def machine_with(self, values: Mapping[str, float]) -> Machine:
+        """Return the machine with parameters given by dotted path, SI units."""
+        return with_values(self.machine, values)
 
 
 def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
@@ -86,22 +90,6 @@ def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
     for effect in effects:
         members += _of_effect(effect)
     return Unknowns(sheet.machine, tuple(members))
-
-
-def with_values(machine: Machine, values: Mapping[str, float]) -> Machine:
-    """Return the machine with parameters replaced by dotted path (`effects.NAME.FIELD` too)."""
-    stated = groups(machine)
-    changed: dict[str, dict[str, float]] = {}
-    for path, value in values.items():
-        group, name = path.rsplit(".", 1)
-        changed.setdefault(group, {})[name] = value
-    new = {group: dataclasses.replace(stated[group], **names) for group, names in changed.items()}
-    effects = {
-        g.removeprefix("effects."): new.pop(g) for g in list(new) if g.startswith("effects.")
-    }
-    return dataclasses.replace(
-        machine, effects=dataclasses.replace(machine.effects, **effects), **new
-    )
 
 
 def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Unknown:

@@ -14,6 +14,7 @@ USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
   analyze    figures and pictures of a recording of the graph
+  design     a predictive controller for a machine, and where it is stable
   diagnose   what a model lacks: the residual of a recording, traced to an effect
 
 `emir COMMAND --help` tells more."""
@@ -25,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
         "analyze": _analyze,
+        "design": _design,
         "diagnose": _diagnose,
     }
     if not words or words[0] in ("-h", "--help"):
@@ -72,6 +74,30 @@ def _analyze(words: list[str]) -> int:
         write_json(run, options.json)
     if options.html:
         write_report(run, options.html)
+    return 0
+
+
+def _design(words: list[str]) -> int:
+    from emir_analysis.design_command import command
+
+    parser = argparse.ArgumentParser(prog="emir design")
+    parser.add_argument(
+        "--from", dest="machine", metavar="MODEL", default="joint1",
+        help="YAML of the machine; default: EMIR's joint 1",
+    )  # fmt: skip
+    parser.add_argument("--controller", default="pfc", help="pfc (default) or pfc_tip")
+    parser.add_argument("--order", type=int, help="of the internal model; default 6, tip 8")
+    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
+    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
+    parser.add_argument(
+        "--observer", type=float, default=0.0, metavar="M/S",
+        help="Kalman filter in place of an independent model: unknown input's change per sample",
+    )  # fmt: skip
+    parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
+    parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
+    print(command(parser.parse_args(words), _progress))
     return 0
 
 

@@ -14,6 +14,7 @@ USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
   analyze    figures and pictures of a recording of the graph
+  compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
   diagnose   what a model lacks: the residual of a recording, traced to an effect
 
@@ -26,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
         "analyze": _analyze,
+        "compare": _compare,
         "design": _design,
         "diagnose": _diagnose,
     }
@@ -74,6 +76,22 @@ def _analyze(words: list[str]) -> int:
         write_json(run, options.json)
     if options.html:
         write_report(run, options.html)
+    return 0
+
+
+def _compare(words: list[str]) -> int:
+    from emir_analysis.compare_command import command
+
+    parser = argparse.ArgumentParser(prog="emir compare")
+    parser.add_argument("--angle", type=float, nargs="+", default=[45.0], metavar="DEG")
+    parser.add_argument("--payload", type=float, nargs="+", default=[0.0], metavar="KG")
+    parser.add_argument("--trajectory", default="lift-lower", help="lift-lower or lower-lift")
+    parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="velocity and deflection")
+    parser.add_argument(
+        "--damping", action="store_true", help="instead: force feedback and capillary line"
+    )
+    print(command(parser.parse_args(words), _progress))
     return 0
 
 

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 PERIOD = CONTROL_PERIOD_NS * 1e-9
 BAR = 1e5
+DAMPED = ForceLoopParameters()
 OUTPUTS = {"pfc": STROKE, "pfc_tip": TIP_ANGLE}  # by controller
 ORDERS = {STROKE: 6, TIP_ANGLE: 8}  # paper 3.3
 RESOLVER_STEP = {STROKE: 1e-3, TIP_ANGLE: 1.5e-3}  # m, rad: 12 bits of a turn
@@ -83,7 +84,7 @@ def steady_motion(plant: Plant, point: OperatingPoint) -> tuple[Array, float]:
         pressure, opening = unknown
         return plant.derivative(state(pressure, opening), opening)[[core.P_H, core.P_S]] / BAR
 
-    guess = valve_command(point.velocity, ForceLoopParameters().prefilter)
+    guess = valve_command(point.velocity, DAMPED.prefilter)
     found = root(pressure_rates, [30.0, guess])
     if not found.success or abs(found.x[1]) > 1.0:
         raise SimulationError(
@@ -93,13 +94,17 @@ def steady_motion(plant: Plant, point: OperatingPoint) -> tuple[Array, float]:
     return state(*found.x), float(found.x[1])
 
 
-def velocity_model(machine: Machine, point: OperatingPoint, output: str) -> InternalModel:
+def velocity_model(
+    machine: Machine,
+    point: OperatingPoint,
+    output: str,
+    force_loop: ForceLoopParameters = DAMPED,
+) -> InternalModel:
     """Return the sampled model from velocity command to `stroke`, m, or `tip_angle`, rad.
 
-    The machine about the point, valve held over a control period, the force loop with its
-    default parameters closed. Raises SimulationError as `steady_motion`.
+    The machine about the point, valve held over a control period, the force loop closed. Raises
+    SimulationError as `steady_motion`.
     """
-    force_loop = ForceLoopParameters()
     plant = Plant(with_values(machine, {"geometry.payload": point.payload}))
     state, command = steady_motion(plant, point)
     linear = linearize(plant, state, command)

@@ -83,12 +83,14 @@ class PfcState(NamedTuple):
 
     origin: the output at which the model's output is 0. model: (n,) x_M(i) before the observer's
     correction. errors: (error_window,) y - y_M, the oldest first. command: the last one, m/s.
+    shift: of the set point, dies out with T_CLRT; by it a controller takes over without a bump.
     """
 
     origin: float
     model: Array
     errors: Array
     command: float
+    shift: float = 0.0
 
 
 class PfcInputs(NamedTuple):
@@ -107,7 +109,7 @@ class PfcOutputs(NamedTuple):
     unlimited: float  # what the law wants, m/s
     reference_term: float  # k^T x_r, m/s
     model_term: float  # a^T x_M, m/s
-    command_term: float  # b^T u and, incremental, u itself, m/s
+    command_term: float  # b^T u, incremental with u itself, m/s
     error_term: float  # h^T (x - x_p), m/s
     model_error: float  # y - y_M, m or rad
     limited: bool  # amplitude or rate
@@ -117,8 +119,8 @@ class PfcOutputs(NamedTuple):
 class Gains:
     """The constant vectors of (12).
 
-    reference: (n_H,), k. decay: sum of k_j lambda^h_j. model: (n,), a. command: b.
-    error: (error_window,), h, the oldest error first.
+    reference: (n_H,), k. decay: sum of k_j lambda^h_j. model: (n,), a. command: b, in the
+    incremental form 1 + b. error: (error_window,), h, the oldest error first.
     """
 
     reference: Array
@@ -153,14 +155,19 @@ class Pfc:
         nu = np.linalg.pinv(basis)[0]
         held = np.array([m.held_response(h) for h in points])
         given = held - basis[:, 0]  # of the command that acts until the new one does
-        decay = math.exp(-3.0 * m.period / p.response_time) ** points
+        decay = self._decay**points
         return Gains(
             reference=nu,
             decay=float(nu @ decay),
             model=-nu @ np.array([m.free_response(h) for h in points]),
-            command=-float(nu @ (held if p.form == "incremental" else given)),
+            command=1.0 - float(nu @ held) if p.form == "incremental" else -float(nu @ given),
             error=-nu @ self._extrapolation(points),
         )
+
+    @cached_property
+    def _decay(self) -> float:
+        """lambda, by which the reference trajectory approaches the set point in one sample."""
+        return math.exp(-3.0 * self.parameters.model.period / self.parameters.response_time)
 
     def _extrapolation(self, points: NDArray[np.int_]) -> Array:
         """Return E, (n_H, error_window): the errors' least-squares polynomial at the points.
@@ -181,7 +188,19 @@ class Pfc:
         p = self.parameters
         model = p.model.steady_state * command
         origin = inputs.output - float(p.model.C @ model)
-        return PfcState(origin, model, np.zeros(p.error_window), command)
+        state = PfcState(origin, model, np.zeros(p.error_window), command)
+        return self.take_over(state, inputs)
+
+    def take_over(self, state: PfcState, inputs: PfcInputs) -> PfcState:
+        """Return the state whose next command is the one in force, if limits and numbers allow.
+
+        The set point is shifted to where the machine is, and the shift dies out with T_CLRT.
+        """
+        g, plain = self.gains, state._replace(shift=0.0)
+        _, outputs = self.step(plain, inputs, self.parameters.model.period)
+        sensitivity = float(g.reference.sum()) - g.decay
+        shift = (state.command - outputs.unlimited) / sensitivity if sensitivity else 0.0
+        return plain._replace(shift=shift if math.isfinite(shift) else 0.0)
 
     def step(self, state: PfcState, inputs: PfcInputs, dt: float) -> tuple[PfcState, PfcOutputs]:
         """Return the velocity command of this control period of dt, s.
@@ -195,18 +214,22 @@ class Pfc:
         future = self._future(inputs)
         if not all(map(math.isfinite, (inputs.output, inputs.set_point, *future))):
             return self._halted(state)
+        if not math.isfinite(state.origin):  # begun without a measurement
+            state = self.initial(inputs)
         model, errors = self._corrected(state, inputs.output)
-        here, output = inputs.set_point - state.origin, inputs.output - state.origin
+        wanted = np.subtract(future, state.origin - state.shift)
+        miss = inputs.set_point + state.shift - inputs.output
         terms = (
-            float(g.reference @ np.subtract(future, state.origin)) - g.decay * (here - output),
+            float(g.reference @ wanted) - g.decay * miss,
             float(g.model @ model),
-            (g.command + (p.form == "incremental")) * state.command,
+            g.command * state.command,
             float(g.error @ errors),
         )
         unlimited = sum(terms)
         command = self._limited(unlimited, state.command)
         applied = state.command if p.delay else command
-        after = PfcState(state.origin, p.model.next(model, applied), errors, command)
+        ahead, shift = p.model.next(model, applied), state.shift * self._decay
+        after = PfcState(state.origin, ahead, errors, command, shift)
         limited = command != unlimited
         return after, PfcOutputs(applied, unlimited, *terms, float(errors[-1]), limited)
 

@@ -1,5 +1,6 @@
 """Predictive control of the TCP's angle alpha_6 (paper 3.3): joint resolver and strain gauges."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -41,8 +42,15 @@ class Tip:
         sag = inputs.deflection
         return TipState(sag, self.pfc.initial(self._inputs(inputs, sag), command))
 
+    def take_over(self, state: TipState, inputs: TipInputs) -> TipState:
+        """Return the state whose next command is the one in force; see `Pfc.take_over`."""
+        after = self.pfc.take_over(state.pfc, self._inputs(inputs, state.sag))
+        return TipState(state.sag, after)
+
     def step(self, state: TipState, inputs: TipInputs, dt: float) -> tuple[TipState, PfcOutputs]:
         """Return the velocity command of this control period of dt, s; see `Pfc.step`."""
+        if not math.isfinite(state.sag):  # begun without a measurement
+            state = self.initial(inputs)
         after, outputs = self.pfc.step(state.pfc, self._inputs(inputs, state.sag), dt)
         return TipState(state.sag, after), outputs
 

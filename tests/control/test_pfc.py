@@ -104,10 +104,12 @@ def test_command_is_the_first_of_the_best_fitting_sequence(
 
 def test_an_error_has_fallen_to_5_percent_after_the_response_time() -> None:
     """A pure integrator follows the reference trajectory; one point of coincidence, h = 1."""
-    law = Pfc(PfcParameters(model=INTEGRATOR, coincidence=(1,), response_time=100 * DT, **WIDE))
-    set_points, none = np.full(121 + PREVIEW, 0.01), np.zeros(200)
-    outputs, _ = _closed_loop(law, INTEGRATOR, set_points, none)
-    assert 1.0 - outputs[100] / 0.01 == pytest.approx(math.exp(-3.0), rel=1e-9)
+    given = PfcParameters(
+        model=INTEGRATOR, coincidence=(1,), response_time=100 * DT, future="constant", **WIDE
+    )
+    set_points = np.where(np.arange(121 + PREVIEW) < 1, 0.0, 0.01)
+    outputs, _ = _closed_loop(Pfc(given), INTEGRATOR, set_points, np.zeros(200))
+    assert 1.0 - outputs[101] / 0.01 == pytest.approx(math.exp(-3.0), rel=1e-9)
 
 
 @pytest.mark.parametrize("future", ["preview", "velocity"])
@@ -187,6 +189,15 @@ def test_a_controller_that_only_follows_is_ready_when_it_takes_over() -> None:
         x = MODEL.next(x, outputs.velocity_command)
     _, taken_over = ready.step(waiting, inputs, DT)
     assert taken_over == outputs
+
+
+def test_a_state_begun_without_a_measurement_begins_anew_with_the_first() -> None:
+    law = Pfc(JOINT)
+    state = law.initial(_inputs(0.1, math.nan))
+    for output in (math.nan, 0.1, 0.1):
+        state, outputs = law.step(state, _inputs(0.1, output), DT)
+        assert outputs.velocity_command == pytest.approx(0.0, abs=1e-12)
+    assert math.isfinite(outputs.unlimited)
 
 
 def test_steady_state_of_the_model_moves_evenly() -> None:

@@ -1,7 +1,8 @@
 """The controllers on the same moves of the nonlinear machine: what each does to the TCP."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
 from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop
 from emir_analysis.report import new_figure
+from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
 from emir_control.pfc import PREVIEW, Future, Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
@@ -26,9 +28,12 @@ SETTLED = 1.0  # s after the stop
 REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 
 
-def controllers() -> dict[str, OuterLoop]:
-    """Return what is compared, by name, with the designs that come with the project."""
-    joint, tip = (pfc_file.load(pfc_file.default_file(o), o) for o in (STROKE, TIP_ANGLE))
+def controllers(
+    joint_file: Path | None = None, tip_file: Path | None = None
+) -> dict[str, OuterLoop]:
+    """Return what is compared, by name; None: the design that comes with the project."""
+    joint = pfc_file.load(joint_file or pfc_file.default_file(STROKE), STROKE)
+    tip = pfc_file.load(tip_file or pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)
     loops: dict[str, OuterLoop] = {"cascade": CascadeLoop()}
     futures: tuple[Future, ...] = ("preview", "velocity", "constant")
     for future in futures:
@@ -56,6 +61,20 @@ class MoveFigures:
     settled: float
     error: float
     roughness: float
+
+
+def repeated(
+    machine: Machine, trajectory: AwayAndBack, outer: OuterLoop, angle: float, count: int
+) -> Iterator[Run]:
+    """Yield runs that differ as two runs of a machine do.
+
+    Each has another sensor noise and starts elsewhere within one step of the resolver.
+    """
+    sensors = machine.sensors
+    step = sensors.resolver_span / 2.0**sensors.resolver_bits
+    for k in range(count):
+        other = with_values(machine, {"sensors.seed": sensors.seed + k})
+        yield run(other, trajectory, outer, angle + step * k / count)
 
 
 def run(machine: Machine, trajectory: AwayAndBack, outer: OuterLoop, angle: float) -> Run:
@@ -121,17 +140,27 @@ COLUMNS = (
 )
 
 
-def as_text(runs: dict[str, Run]) -> str:
-    """Return the figures of runs by name as one table, in the form of Markdown."""
+def as_text(runs: dict[str, list[Run]]) -> str:
+    """Return the figures of runs by name as one table, in the form of Markdown.
+
+    Of several runs of a name: mean and standard deviation.
+    """
     lines = ["| controller | move | " + " | ".join(title for _, title, _ in COLUMNS) + " |"]
     lines.append("| --- | --- |" + " ---: |" * len(COLUMNS))
-    for name, signals in runs.items():
-        moves = list(_moves(signals["reference_velocity"]))
-        for move, found in zip(moves, figures(signals), strict=True):
-            lifts = signals["reference_velocity"][move].sum() > 0.0
-            cells = (f"{getattr(found, field) * factor:.2f}" for field, _, factor in COLUMNS)
-            lines.append(f"| {name} | {'lift' if lifts else 'lower'} | {' | '.join(cells)} |")
+    for name, repeated in runs.items():
+        velocity = repeated[0]["reference_velocity"]
+        by_move = zip(*(figures(signals) for signals in repeated), strict=True)
+        for move, found in zip(_moves(velocity), by_move, strict=True):
+            direction = "lift" if velocity[move].sum() > 0.0 else "lower"
+            lines.append(f"| {name} | {direction} | {' | '.join(_cells(found))} |")
     return "\n".join(lines)
+
+
+def _cells(repeated: Sequence[MoveFigures]) -> Iterator[str]:
+    for name, _, factor in COLUMNS:
+        values = factor * np.array([getattr(move, name) for move in repeated])
+        spread = f" \u00b1 {values.std(ddof=1):.2f}" if values.size > 1 else ""
+        yield f"{values.mean():.2f}{spread}"
 
 
 def picture(runs: dict[str, Run]) -> Figure:

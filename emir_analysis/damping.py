@@ -7,15 +7,27 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from emir_analysis.design_pfc import DAMPED, OperatingPoint, steady_motion, velocity_model
+from emir_analysis.design_pfc import (
+    DAMPED,
+    PERIOD,
+    OperatingPoint,
+    steady_motion,
+    velocity_model,
+)
+from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
-from emir_control.force_loop import ForceLoopParameters
+from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 
+Array = NDArray[np.float64]
+
 SLOW = 2.0  # Hz, above the oil spring's mode and below the first bending mode
 STANDSTILL = 10.0  # s
+SWING, LIFTED = 8.0, 0.7  # s
 REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 LIFTING = OperatingPoint(velocity=0.025)
 LITRES_PER_MINUTE = 6e4  # of 1 m^3/s
@@ -71,6 +83,43 @@ def _slow_mode(machine: Machine, force_loop: ForceLoopParameters) -> float:
     poles = np.log(np.linalg.eigvals(model.A).astype(complex)) / model.period
     slow = [s for s in poles if s.imag > 0.0 and abs(s) < 2.0 * math.pi * SLOW]
     return min((float(-s.real / abs(s)) for s in slow), default=1.0)
+
+
+def swing(machine: Machine, leakage: float, force_loop: ForceLoopParameters) -> Array:
+    """Return the piston velocity, m/s, every control period: lift for 0.7 s, then stop."""
+    plant, loop = Plant(with_values(machine, {LEAKAGE: leakage})), ForceLoop(force_loop)
+    state = plant.initial(LIFTING.angle, REST_PRESSURE)
+    shown, control, velocity = plant.outputs(state), None, []
+    for time in np.arange(0.0, SWING, PERIOD):
+        wanted = LIFTING.velocity if time < LIFTED else 0.0
+        sensed = ForceLoopInputs(
+            wanted, 0.0, shown.angle, shown.pressure_lifting, shown.pressure_lowering
+        )
+        control, out = loop.step(control or loop.initial(sensed), sensed, PERIOD)
+        state, shown = plant.step(state, out.valve_command, PERIOD)
+        velocity.append(shown.velocity)
+    return np.array(velocity)
+
+
+def picture(machine: Machine) -> Figure:
+    """Return swing after a stop, sinking with the valve shut, and oil used, of all ways."""
+    figure = new_figure(8.0)
+    velocity, height, oil = figure.subplots(3, 1, height_ratios=(3, 2, 2))
+    for k, (name, (leakage, force_loop)) in enumerate(WAYS.items()):
+        found = swing(machine, leakage, force_loop)
+        velocity.plot(np.arange(found.size) * PERIOD, found * 1e3, label=name, lw=1.2)
+        plant = Plant(with_values(machine, {LEAKAGE: leakage}))
+        rest = plant.initial(LIFTING.angle, REST_PRESSURE)
+        angle = plant.simulate(rest, np.zeros(100), STANDSTILL / 100.0)[:, 0]
+        drop = machine.geometry.boom_length * (angle - angle[0])
+        height.plot(np.linspace(0.0, STANDSTILL, drop.size), drop * 1e2, lw=1.2)
+        at_rest = damping_figures(machine, leakage, force_loop).at_rest
+        oil.bar(k, at_rest * LITRES_PER_MINUTE)
+    velocity.set(xlabel="time / s", ylabel="piston velocity / mm/s", title="lifted, then stopped")
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize="small")
+    height.set(xlabel="time / s", ylabel="TCP / cm", title="valve shut")
+    oil.set(ylabel="oil / l/min", title="through the line at rest", xticks=[])
+    return figure
 
 
 def as_text(machine: Machine) -> str:

@@ -17,7 +17,6 @@ from emir_analysis.design_pfc import (
 )
 from emir_analysis.errors import InputError
 from emir_common.quantity import ParameterError
-from emir_common.version import software_version
 from emir_control import pfc_file
 from emir_plant.parameters import Machine
 from emir_plant.plant import SimulationError
@@ -69,11 +68,10 @@ def _tuning(options: Namespace) -> dict[str, object]:
 
 
 def _made_by(options: Namespace, task: DesignTask) -> dict[str, object]:
+    words = [f"--from {options.machine}", f"--controller {task.controller}"]
+    words += [f"--order {task.order}", f"--angle {options.angle:g}"]
+    words += [f"--payload {options.payload:g}", f"--observer {options.observer:g}"]
     return {
-        "software": f"emir {software_version()}",
-        "machine": options.machine,
-        "angle_deg": options.angle,
-        "payload_kg": task.point.payload,
-        "velocity_m_s": task.point.velocity,
-        "observer_m_s": task.observer,
+        "command": f"emir design {' '.join(words)}",
+        "linearized at": f"piston velocity {task.point.velocity:g} m/s, force loop closed",
     }

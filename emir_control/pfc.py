@@ -245,7 +245,9 @@ class Pfc:
         m = self.parameters.model
         error = output - state.origin - float(m.C @ state.model)
         model = state.model if m.observer is None else state.model + m.observer * error
-        return model, np.append(state.errors[1:], error)
+        errors = np.empty_like(state.errors)
+        errors[:-1], errors[-1] = state.errors[1:], error
+        return model, errors
 
     def _future(self, inputs: PfcInputs) -> list[float]:
         """Return c(i+h_j)."""

@@ -28,6 +28,7 @@ class Switched:
     how: str
 
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
+        """Return state and command; see `OuterLoop`."""
         wanted, reading = now.reference, now.reading
         for_cascade = CascadeInputs(wanted, reading.stroke)
         for_law = PfcInputs(wanted.stroke, wanted.velocity, now.preview, reading.stroke)

@@ -48,7 +48,7 @@ class ClosedLoop:
         rows: dict[str, list[float]] = {}
         last = round(duration / PERIOD) * TICKS
         for tick in range(last + 1):
-            reading = measure(self.plant, truth, tick)
+            reading = measure(self.plant, truth, tick, state)
             _append(rows, reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True)))
             if tick % TICKS == 0:
                 here = TrajectoryInputs(reading.stroke)

@@ -109,7 +109,7 @@ def velocity_model(
     state, command = steady_motion(plant, point)
     linear = linearize(plant, state, command)
     rows = dict(zip(core.Truth._fields, linear.C, strict=True))
-    n = len(state)
+    n = len(linear.A)
     held = expm(PERIOD * np.block([[linear.A, linear.B], [np.zeros((1, n + 1))]]))
     valve = InternalModel(held[:n, :n], held[:n, n], rows[output], PERIOD)
     ends = 0.99 * point.velocity, 1.01 * point.velocity

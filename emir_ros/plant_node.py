@@ -98,7 +98,7 @@ class PlantNode(Shell):
         self.tick += 1
 
     def _publish_sensors(self, stamp: int) -> None:
-        reading = measure(self.plant, self.truth, self.tick)
+        reading = measure(self.plant, self.truth, self.tick, self.state)
         signals = reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
         for topic in OUTPUTS:
             self.publish(topic, stamp, signals)

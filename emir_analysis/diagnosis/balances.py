@@ -95,8 +95,10 @@ class Balances:
         return self._mean(signal)
 
     def residuals(self, machines: Sequence[Machine]) -> Array:
-        """Return what is missing in each balance, (m, w, 5), SI units; NaN for a machine that
-        cannot rest at the recording's start."""
+        """Return what is missing in each balance, (m, w, 5), SI units.
+
+        NaN for a machine that cannot rest at the recording's start.
+        """
         experiment = self._experiment
         plants = [Plant(machine) for machine in machines]
         angle, pressure = experiment.start()
@@ -118,7 +120,9 @@ class Balances:
             return []
         records = np.concatenate([plants[k].record for k in starts])
         every = self._experiment.every
-        stride = max(n for n in range(1, every + 1) if every % n == 0 and n * COMMAND_STEP <= SUBSTEP)
+        stride = max(
+            n for n in range(1, every + 1) if every % n == 0 and n * COMMAND_STEP <= SUBSTEP
+        )
         followed = follow(
             np.array(list(starts.values())),
             self._experiment.commands[::stride],

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
@@ -97,7 +96,9 @@ def with_values(machine: Machine, values: Mapping[str, float]) -> Machine:
         group, name = path.rsplit(".", 1)
         changed.setdefault(group, {})[name] = value
     new = {group: dataclasses.replace(stated[group], **names) for group, names in changed.items()}
-    effects = {g.removeprefix("effects."): new.pop(g) for g in list(new) if g.startswith("effects.")}
+    effects = {
+        g.removeprefix("effects."): new.pop(g) for g in list(new) if g.startswith("effects.")
+    }
     return dataclasses.replace(
         machine, effects=dataclasses.replace(machine.effects, **effects), **new
     )
@@ -112,10 +113,10 @@ def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Un
 
 def _of_effect(effect: str) -> list[Unknown]:
     kind = REGISTRY[effect]
-    defaults = {f.name: f.default for f in dataclasses.fields(kind)}
+    stated = kind()
     members = []
     for name, about in quantities(kind).items():
-        value = float(kind.trial.get(name, defaults[name]))
+        value = float(kind.trial.get(name, getattr(stated, name)))
         path = f"effects.{effect}.{name}"
         if about.low > 0.0 and about.high / about.low > WIDE:
             low, high = math.log(about.low / value), math.log(about.high / value)

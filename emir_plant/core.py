@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_plant import dry_friction
 from emir_plant.effects import (
     backlash,
     command_delay,
@@ -20,6 +21,7 @@ from emir_plant.effects import (
     supply_pressure_droop,
     terms,
     valve_hysteresis,
+    viscous_friction,
 )
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
@@ -125,6 +127,15 @@ def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Arr
     """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
     p = parameters[0]
     motion = _motion(x, p)
+    dry = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    _write_rates(x, command, motion, dry, p, dx)
+
+
+@compiled
+def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
+    x: Array, command: float, motion: _Motion, dry: float, p: Any, dx: Array
+) -> None:
+    """Write dx/dt under a given dry friction, N."""
     flow_lifting, flow_lowering, pumped = _valve_flows(x, p)
     leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
     lifting = flow_lifting - leak_lifting - chambers.relief_flow(x[P_H], p)
@@ -148,7 +159,7 @@ def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Arr
     dx[EDGES] = valve_hysteresis.rate(x[SPOOL], x[EDGES], p)
     dx[OFFSET] = motion.offset_rate
     _write_lags(x, motion, p, dx)
-    _write_boom(x, motion, p, dx)
+    _write_boom(x, motion, dry, p, dx)
 
 
 @compiled
@@ -162,10 +173,10 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
 
 
 @compiled
-def _write_boom(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
+def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> None:
     n = p.mode_joint.size
     position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
-    friction = terms.friction(motion.joint_velocity, motion.force, p)
+    friction = dry + viscous_friction.friction(motion.joint_velocity, p)
     torque = (motion.force - friction) * motion.arm
     gravity = math.cos(motion.angle)
     load = external_load.force(x[TIME], p)
@@ -221,20 +232,35 @@ def _advance(x: Array, command: float, dt: float, parameters: NDArray[Any], work
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
-        write_derivative(x, arriving, parameters, k1)
+        dry = _write_first_rates(x, arriving, h, p, k1)
         for i in range(x.size):
             between[i] = x[i] + 0.5 * h * k1[i]
-        write_derivative(between, arriving, parameters, k2)
+        _write_rates(between, arriving, _motion(between, p), dry, p, k2)
         for i in range(x.size):
             between[i] = x[i] + 0.5 * h * k2[i]
-        write_derivative(between, arriving, parameters, k3)
+        _write_rates(between, arriving, _motion(between, p), dry, p, k3)
         for i in range(x.size):
             between[i] = x[i] + h * k3[i]
-        write_derivative(between, arriving, parameters, k4)
+        _write_rates(between, arriving, _motion(between, p), dry, p, k4)
         for i in range(x.size):
             x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         x[P_H] = max(x[P_H], 0.0)
         x[P_S] = max(x[P_S], 0.0)
+
+
+@compiled
+def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) -> float:
+    """Write dx/dt at the start of a step of h, s; return the dry friction over the step, N."""
+    n = p.mode_joint.size
+    motion = _motion(x, p)
+    _write_rates(x, command, motion, 0.0, p, dx)
+    gained = motion.arm * _dot(p.mode_joint, dx[MODES + n : MODES + 2 * n])
+    mobility = h * motion.arm * motion.arm * _dot(p.mode_joint, p.mode_joint)
+    unhindered = motion.joint_velocity + h * gained
+    dry = dry_friction.over_step(unhindered, mobility, motion.force, p)
+    for i in range(n):
+        dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry
+    return dry
 
 
 @compiled

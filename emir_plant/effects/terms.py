@@ -23,9 +23,14 @@ def friction(velocity: float, load: float, p: Any) -> float:
 
     load: force of the oil on the piston, N.
     """
+    return dry_friction(velocity, load, p) + viscous_friction.friction(velocity, p)
+
+
+@compiled
+def dry_friction(velocity: float, load: float, p: Any) -> float:
+    """Return the part of `friction` that is steep near standstill, N."""
     dry = coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
-    dry += pressure_dependent_friction.friction(velocity, load, p)
-    return dry + viscous_friction.friction(velocity, p)
+    return dry + pressure_dependent_friction.friction(velocity, load, p)
 
 
 @compiled

@@ -1,0 +1,81 @@
+"""Dry friction, however steep, in steps of a millisecond."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from emir_common.parameter_tree import with_values
+from emir_plant import core, dry_friction
+from emir_plant.core import Truth
+from emir_plant.plant import Plant
+from emir_plant.sheet import joint1
+
+FORTY_FIVE = math.radians(45.0)
+STROKE = Truth._fields.index("stroke")
+
+
+def _with_friction(force: float, smoothing_speed: float) -> Plant:
+    values = {
+        "effects.coulomb_friction.force": force,
+        "effects.coulomb_friction.smoothing_speed": smoothing_speed,
+    }
+    return Plant(with_values(joint1(), values))
+
+
+@pytest.mark.parametrize("unhindered", [1e-6, 1e-3, 0.05, -1e-6, -0.05])
+def test_friction_of_a_step_belongs_to_the_velocity_at_its_end(unhindered: float) -> None:
+    p, mobility = _with_friction(2e4, 1e-4).record[0], 2e-7
+    friction = dry_friction.over_step(unhindered, mobility, 6e5, p)
+    end = unhindered - mobility * friction
+    assert friction == pytest.approx(2e4 * math.tanh(end / 1e-4), rel=1e-6)
+    assert end * unhindered >= 0.0  # it stops a motion, it does not turn it round
+
+
+def test_a_piston_that_friction_can_hold_stands() -> None:
+    """5 % more pressure than the load needs, 34 kN, against 60 kN of friction, for 10 s.
+
+    It creeps at less than the smoothing speed; without friction it would swing over 1 mm.
+    """
+    plant = _with_friction(6e4, 1e-5)
+    state = plant.initial(FORTY_FIVE, 20e5)
+    state[core.P_H] *= 1.05
+    run = plant.simulate(state, np.zeros(10_000), 1e-3, 10)
+    free = Plant(joint1()).simulate(state, np.zeros(10_000), 1e-3, 10)
+    assert np.ptp(run[:, STROKE]) < 10.0 * 1e-5
+    assert np.ptp(free[:, STROKE]) > 1e-3
+
+
+def test_sticking_and_sliding_agree_with_a_stiff_solver() -> None:
+    """Lift, stop, lower: slope 2e7 N s/m, where an explicit step of 1 ms chatters."""
+    plant, commands = _with_friction(2e4, 1e-3), np.zeros(3000)
+    commands[100:1000], commands[1500:2500] = 0.5, -0.5
+    state = start = plant.initial(FORTY_FIVE, 20e5)
+    ours, reference = plant.simulate(start, commands, 1e-3), [start]
+    edges = np.flatnonzero(np.diff(commands, prepend=np.nan, append=np.nan))
+    for begin, end in itertools.pairwise(edges):
+        times = np.arange(begin, end + 1) * 1e-3
+        solved = solve_ivp(
+            lambda _t, x, y=commands[begin]: plant.derivative(x, y),
+            (times[0], times[-1]),
+            state,
+            method="LSODA",
+            t_eval=times,
+            rtol=1e-8,
+            atol=1e-9,
+            max_step=2e-3,
+        )
+        reference.extend(solved.y.T[1:])
+        state = solved.y[:, -1]
+    exact = np.array([plant.outputs(x) for x in reference])
+    assert np.abs(ours[:, STROKE] - exact[:, STROKE]).max() < 5e-6  # a tenth of a resolver step
+    for name in ("pressure_lifting", "pressure_lowering"):
+        k = Truth._fields.index(name)
+        assert np.abs(ours[:, k] - exact[:, k]).max() < 2e-3 * np.ptp(exact[:, k]), name
+
+
+def test_without_friction_nothing_changes() -> None:
+    p = Plant(joint1()).record[0]
+    assert dry_friction.over_step(0.01, 2e-7, 6e5, p) == 0.0

@@ -107,7 +107,7 @@ def cylinder_length(angle: float, p: Any) -> float:
 @compiled
 def stroke(angle: float, p: Any) -> float:
     """Return the piston stroke h, m, at the joint angle, rad."""
-    return cylinder_length(angle, p) - cylinder_length(0.0, p)
+    return cylinder_length(angle, p) - p.length_stretched
 
 
 @compiled
@@ -125,7 +125,7 @@ def ratio_slope(angle: float, p: Any) -> float:
 @compiled
 def angle(stroke: float, p: Any) -> float:
     """Return the joint angle, rad, at the piston stroke, m; nan outside the linkage's reach."""
-    theta = _apex(p.foot, p.lever, cylinder_length(0.0, p) + stroke)
+    theta = _apex(p.foot, p.lever, p.length_stretched + stroke)
     lever = p.foot_direction + p.lever_side * theta
     if p.thrust_bar == 0.0:
         found = lever - p.arm_link_direction

@@ -101,6 +101,23 @@ class Arm:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Pump:
+    """The one pump of all actuators; it holds the main joint's p0 while its flow lasts."""
+
+    flow_max: float = quantity("m^3/s", 1e-5, 1.0, "largest flow")
+    droop: float = quantity("Pa", 1e4, 1e7, "missing pressure at which it gives its largest flow")
+    line_volume: float = quantity("m^3", 1e-4, 10.0, "oil between pump and valves")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndStop:
+    """What the piston meets at the ends of its stroke."""
+
+    stiffness: float = quantity("N/m", 1e5, 1e10, "of cylinder head and piston")
+    damping: float = quantity("N s/m", 0.0, 1e8, "while pressed in")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Robot:
     """All parameters of the robot.
 
@@ -111,6 +128,8 @@ class Robot:
     main: Machine
     base: Base
     arm: Arm
+    pump: Pump
+    end_stop: EndStop
     joint1: MainJoint
     joint2: Joint
     joint3: Joint
@@ -119,7 +138,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_ranges(self.base, "base.")
-        check_ranges(self.arm, "arm.")
+        for name in ("arm", "pump", "end_stop"):
+            check_ranges(getattr(self, name), f"{name}.")
         check_ranges(self.joint1, "joint1.")
         check_ranges(self.joint1.parts, "joint1.parts.")
         for number, joint in enumerate(self.four_bars, start=2):

@@ -17,11 +17,13 @@ SETTLED = 1e-13  # m or rad, change of the deflections from one iteration to the
 
 
 class Deflection(NamedTuple):
-    """The TCP against that of the rigid robot with the same joint angles, ground's axes."""
+    """The TCP, and its deflection from that of the rigid robot with the same joint angles."""
 
-    position: Array  # of r_6, (3,), m
-    axes: Array  # of x_6, y_6, z_6 in the columns, (3, 3)
-    rotation: Array  # rotation vector, (3,), rad
+    tcp: Array  # r_6, (3,), m, deflected
+    tcp_axes: Array  # x_6, y_6, z_6 in the columns, (3, 3), deflected
+    position: Array  # deflection of r_6, (3,), m, ground's axes
+    axes: Array  # deflection of x_6, y_6, z_6 in the columns, (3, 3)
+    rotation: Array  # the same as a rotation vector, (3,), rad
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def deflection(mechanics: Mechanics, q: Array) -> Deflection:
     )
     size = float(np.linalg.norm(sine))
     rotation = sine * (math.asin(min(size, 1.0)) / size if size > 0.0 else 1.0)
-    return Deflection(bent - straight, bent_axes - axes, rotation)
+    return Deflection(bent, bent_axes, bent - straight, bent_axes - axes, rotation)
 
 
 def weight_stiffness(mechanics: Mechanics, q: Array) -> Array:

@@ -43,12 +43,13 @@ def record(geometry: Linkage) -> NDArray[Any]:
     Raises PostureError where the loop does not close there.
     """
     values: dict[str, float] = {n: float(getattr(geometry, n)) for n in quantities(geometry)}
-    values |= {"lever_side": 1.0, "arm_side": 1.0}
+    values |= {"lever_side": 1.0, "arm_side": 1.0, "length_stretched": 0.0}
     table = np.array([tuple(values.values())], dtype=[(name, np.float64) for name in values])
     p = table[0]
     if not math.isfinite(linkage.lever_direction(0.0, p)):
         raise PostureError("the linkage does not close at alpha = 0")
     p["lever_side"] = math.copysign(1.0, _lever_in_line_with_cylinder(0.0, p))
+    p["length_stretched"] = linkage.cylinder_length(0.0, p)
     p["arm_side"] = math.copysign(1.0, _bar_in_line_with_arm_link(0.0, p))
     return table
 

@@ -141,6 +141,23 @@ def _loops(model: pin.Model) -> tuple[pin.StdVec_RigidConstraintModel, object]:
     return constraints, scratch
 
 
+def test_mass_and_bias_are_mujocos() -> None:
+    """The chain without linkage parts, written for another rigid-body library."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install mujoco")
+    from emir_analysis.robot_bench import massless_parts, mjcf
+
+    machine = massless_parts(ROBOT)
+    model = mujoco.MjModel.from_xml_string(mjcf(machine, 1e-3))
+    data, (q, v) = mujoco.MjData(model), _random_state(5)
+    data.qpos[:], data.qvel[:] = q, v
+    mujoco.mj_forward(model, data)
+    product = np.zeros(96)
+    mujoco.mj_mulM(model, data, product, v)
+    mass, bias = Mechanics(machine).mass_and_bias(q, v)
+    assert mass @ v == pytest.approx(product, rel=1e-9, abs=1e-9 * np.abs(product).max())
+    assert bias == pytest.approx(data.qfrc_bias, rel=1e-9, abs=1e-9 * np.abs(bias).max())
+
+
 def test_mass_matrix_holds_the_kinetic_energy() -> None:
     q, v = _random_state(3)
     assert 0.5 * v @ MECHANICS.mass(q) @ v == pytest.approx(MECHANICS.energy(q, v)[0], rel=1e-12)

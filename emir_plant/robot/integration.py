@@ -93,6 +93,12 @@ def _end_stop(stroke: float, velocity: float, stop: Array) -> float:
 
 
 @compiled
+def _meets_stop(stroke: float, way: float, stop: Array) -> bool:
+    """Return whether a piston is, or on its way, m, will be pressed into an end stop."""
+    return min(stroke, stroke + way) < stop[LOWEST] or max(stroke, stroke + way) > stop[HIGHEST]
+
+
+@compiled
 def _oil(x: Array, h: float, commands: Array, motion: Array, t: Tables) -> None:
     """Advance the oil, x (31,), by h, s, in place while the motion is held."""
     k = np.empty((4, x.size))
@@ -108,18 +114,27 @@ def _oil(x: Array, h: float, commands: Array, motion: Array, t: Tables) -> None:
 
 
 @compiled
-def _stiffen(mass: Array, h: float, motion: Array, t: Tables) -> None:
-    """Add to the mass matrix, in place, what the midpoint rule takes implicitly."""
+def _stiffen(mass: Array, h: float, ahead: float, motion: Array, t: Tables) -> None:
+    """Add to the mass matrix, in place, what the midpoint rule takes implicitly.
+
+    ahead: time, s, for which the matrix is to serve.
+    """
     block = 0.5 * h * t.damper + 0.25 * h * h * t.spring
     for c in range(t.cuts.shape[0]):
         for i in range(COORDINATES):
             for j in range(COORDINATES):
                 mass[t.cuts[c, i], t.cuts[c, j]] += block[i, j]
-    for k in range(ACTUATORS):  # friction may be steep where a piston stands
-        slope = actuators.friction_slope(motion[VELOCITY, k], t.drives[k])
-        slope = slope * motion[RATIO, k] ** 2 + t.brakes[HOLD_DAMPING, k]
-        slope += 0.5 * h * t.brakes[HOLD_STIFFNESS, k]
-        mass[t.joints[k], t.joints[k]] += 0.5 * h * slope
+    for k in range(ACTUATORS):
+        # friction may be steep where a piston stands; an end stop always is
+        damping = actuators.friction_slope(motion[VELOCITY, k], t.drives[k])
+        stiffness = 0.0
+        if k > 0 and _meets_stop(motion[STROKE, k], motion[VELOCITY, k] * ahead, t.stops[:, k]):
+            damping += t.stops[STOP_DAMPING, k]
+            stiffness += t.stops[STOP_STIFFNESS, k]
+        square = motion[RATIO, k] * motion[RATIO, k]
+        damping = damping * square + t.brakes[HOLD_DAMPING, k]
+        stiffness = stiffness * square + t.brakes[HOLD_STIFFNESS, k]
+        mass[t.joints[k], t.joints[k]] += 0.5 * h * damping + 0.25 * h * h * stiffness
 
 
 @compiled
@@ -133,7 +148,11 @@ def _write_impulse(
         at = t.joints[k]
         middle = q[at] + 0.5 * h * v[at]
         ratio = linkage.ratio(middle, t.linkages[k - 1]) if k > 0 else 1.0
-        torque = ratio * (force[k] + motion[STOP_FORCE, k])
+        stop = 0.0
+        if k > 0:
+            halfway = motion[STROKE, k] + 0.5 * h * motion[VELOCITY, k]
+            stop = _end_stop(halfway, motion[VELOCITY, k], t.stops[:, k])
+        torque = ratio * (force[k] + stop)
         torque -= t.brakes[HOLD_STIFFNESS, k] * (middle - t.brakes[HELD_AT, k])
         impulse[at] += h * (torque - t.brakes[HOLD_DAMPING, k] * v[at])
     for c in range(t.cuts.shape[0]):
@@ -163,7 +182,7 @@ def period(
     """
     motion, change = np.empty((4, ACTUATORS)), np.empty(q.size)
     drive_motion(q, v, t, motion)
-    _stiffen(mass, h, motion, t)
+    _stiffen(mass, h, steps * h, motion, t)
     lower = np.ascontiguousarray(np.linalg.cholesky(mass))
     upper = np.ascontiguousarray(lower.T)
     _oil(oil, 0.5 * h, commands, motion, t)

@@ -20,6 +20,7 @@ from emir_plant.robot.stiffness import cut_damping, cut_stiffness
 
 Array = NDArray[np.float64]
 
+BROKEN = 0.1  # rad beyond the end of the stroke; the linkage is dead 0.15 rad beyond it
 BRAKE_STIFFNESS = 1e11  # N m/rad, of a locked joint: 500 times a cut's, so as good as rigid
 
 
@@ -167,12 +168,23 @@ class RobotPlant:
     def step(self, state: Array, commands: Array, dt: float) -> tuple[Array, RobotTruth]:
         """Return the state after dt, s, under constant commands, (6,), and what it shows.
 
-        Commands are limited to [-1, 1]. Raises SimulationError when the state is not finite.
+        Commands are limited to [-1, 1]. Raises SimulationError when the state is not finite or an
+        arm was thrown through an end stop.
         """
         after = self.advance(state, np.clip(commands, -1.0, 1.0), dt)
         if not np.isfinite(after).all():
             raise SimulationError(f"the state is not finite after a step with y2 = {commands}")
+        self._check_stops(after)
         return after, self.outputs(after)
+
+    def _check_stops(self, state: Array) -> None:
+        """Raise SimulationError where an arm was thrown through its end stop."""
+        angles = state[SIZE + self.mechanics.topology.joints[1:]]
+        for number, (angle, of) in enumerate(zip(angles, self.mechanics.reaches, strict=True), 1):
+            if not of.angle_low - BROKEN < angle < of.angle_high + BROKEN:
+                raise SimulationError(
+                    f"joint {number} went through its end stop, to {math.degrees(angle):.1f} deg"
+                )
 
     def outputs(self, state: Array) -> RobotTruth:
         """Return what an ideal observer would read off the state."""

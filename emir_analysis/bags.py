@@ -3,7 +3,7 @@
 import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, cast
 
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Footer, McapRecord, Metadata, Schema
@@ -22,6 +22,7 @@ class _Stream:
         self._file = file
 
     def read(self, length: int) -> bytes:
+        """Return `length` bytes. Raises EndOfFile when there are fewer."""
         data = self._file.read(length)
         if len(data) < length:
             raise EndOfFile
@@ -79,6 +80,7 @@ def files(path: Path) -> list[Path]:
 
 
 def recorded_topics(path: Path) -> set[str]:
+    """Return the names of the topics in a recording. Raises InputError as `read`."""
     records = (record for file in files(path) for record in _records(file))
     return {record.topic for record in records if isinstance(record, Channel)}
 
@@ -125,6 +127,11 @@ def _header_stamp(data: Any, log_time: int) -> int:
     return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
 
 
+def _sequence(stream: IO[bytes]) -> Iterator[McapRecord]:
+    reader = StreamReader(cast("IO[bytes]", _Stream(stream)), validate_crcs=True)
+    yield from reader.records
+
+
 def _records(file: Path) -> Iterator[McapRecord]:
     """Yield the records of a file in their order, up to where it was cut off.
 
@@ -132,7 +139,7 @@ def _records(file: Path) -> Iterator[McapRecord]:
     """
     try:
         with file.open("rb") as stream:
-            for record in StreamReader(_Stream(stream), validate_crcs=True).records:
+            for record in _sequence(stream):
                 yield record
                 if isinstance(record, Footer):
                     return

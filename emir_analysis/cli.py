@@ -14,6 +14,9 @@ USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
   analyze    figures and pictures of a recording of the graph
+  compare    every controller on the same moves: lag, deflection of the TCP, smoothness
+  design     a predictive controller for a machine, and where it is stable
+  figures    the paper's figures, drawn by this machine and its controllers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
 
 `emir COMMAND --help` tells more."""
@@ -25,6 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
         "analyze": _analyze,
+        "compare": _compare,
+        "design": _design,
+        "figures": _figures,
         "diagnose": _diagnose,
     }
     if not words or words[0] in ("-h", "--help"):
@@ -49,10 +55,13 @@ def _complain(who: str, message: str) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """Hand over to the one package that knows ROS, in this same process."""
+    """Hand over to the one package that knows ROS, in this same process.
+
+    -P: what lies in the current folder is not imported.
+    """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-m", "emir_ros.run", *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
 
 
 def _analyze(words: list[str]) -> int:
@@ -69,6 +78,65 @@ def _analyze(words: list[str]) -> int:
         write_json(run, options.json)
     if options.html:
         write_report(run, options.html)
+    return 0
+
+
+def _compare(words: list[str]) -> int:
+    from emir_analysis.compare_command import command
+
+    parser = argparse.ArgumentParser(prog="emir compare")
+    parser.add_argument("--angle", type=float, nargs="+", default=[45.0], metavar="DEG")
+    parser.add_argument("--payload", type=float, nargs="+", default=[0.0], metavar="KG")
+    parser.add_argument("--trajectory", default="lift-lower", help="lift-lower or lower-lift")
+    parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
+    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="mean and deviation")
+    parser.add_argument("--pfc", type=Path, metavar="FILE", help="made by emir design")
+    parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="velocity and deflection")
+    parser.add_argument(
+        "--damping", action="store_true", help="instead: force feedback and capillary line"
+    )
+    print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _design(words: list[str]) -> int:
+    from emir_analysis.design_command import command
+
+    parser = argparse.ArgumentParser(prog="emir design")
+    parser.add_argument(
+        "--from", dest="machine", metavar="MODEL", default="joint1",
+        help="YAML of the machine; default: EMIR's joint 1",
+    )  # fmt: skip
+    parser.add_argument("--controller", default="pfc", help="pfc (default) or pfc_tip")
+    parser.add_argument("--order", type=int, help="of the internal model; default 6, tip 8")
+    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
+    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
+    parser.add_argument(
+        "--observer", type=float, default=0.0, metavar="M/S",
+        help="Kalman filter in place of an independent model: unknown input's change per sample",
+    )  # fmt: skip
+    parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
+    parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
+    print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _figures(words: list[str]) -> int:
+    from emir_analysis.paper_figures import FIGURES, draw
+
+    everything = ",".join(map(str, FIGURES))
+    parser = argparse.ArgumentParser(prog="emir figures")
+    parser.add_argument("--only", default=everything, metavar="N,N", help=f"of {everything}")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for the PNG files")
+    options = parser.parse_args(words)
+    numbers = options.only.split(",")
+    if not all(number.isdecimal() for number in numbers):
+        raise InputError(f"--only {options.only}: not numbers with commas between")
+    for file in draw([int(number) for number in numbers], options.out, _progress):
+        print(file)
     return 0
 
 

@@ -8,27 +8,32 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
+from emir_analysis.outer_loop import CascadeLoop, OuterLoop, Situation
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TRUTH
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    CYLINDER_PREVIEW,
+    PLANT_PERIOD_NS,
+    TRUTH,
+)
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 
 Array = NDArray[np.float64]
 
 TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
-CONTROL_PERIOD = CONTROL_PERIOD_NS * 1e-9
+PERIOD = CONTROL_PERIOD_NS * 1e-9
 PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """Machine and conventional control of the piston (paper 3.1, 3.2)."""
+    """Machine, outer loop (paper 3.2 or 3.3) and force loop (paper 3.1)."""
 
     plant: Plant
     trajectory: AwayAndBack
-    cascade: Cascade = field(default_factory=lambda: Cascade(CascadeParameters()))
+    outer: OuterLoop = field(default_factory=CascadeLoop)
     force_loop: ForceLoop = field(default_factory=lambda: ForceLoop(ForceLoopParameters()))
 
     def run(self, angle: float, pressure_lowering: float, duration: float) -> dict[str, Array]:
@@ -39,30 +44,30 @@ class ClosedLoop:
         """
         state = self.plant.initial(angle, pressure_lowering)
         truth = self.plant.outputs(state)
-        following = cascading = damping = None
+        following = controlling = damping = None
         rows: dict[str, list[float]] = {}
-        last = round(duration / CONTROL_PERIOD) * TICKS
+        last = round(duration / PERIOD) * TICKS
         for tick in range(last + 1):
-            reading = measure(self.plant, truth, tick)
+            reading = measure(self.plant, truth, tick, state)
             _append(rows, reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True)))
             if tick % TICKS == 0:
                 here = TrajectoryInputs(reading.stroke)
                 following = following or self.trajectory.initial(here)
-                following, reference = self.trajectory.step(following, here, CONTROL_PERIOD)
+                preview = self.trajectory.ahead(following, len(CYLINDER_PREVIEW.fields), PERIOD)
+                following, reference = self.trajectory.step(following, here, PERIOD)
 
-                tracking = CascadeInputs(reference, reading.stroke)
-                cascading = cascading or self.cascade.initial(tracking)
-                cascading, wanted = self.cascade.step(cascading, tracking, CONTROL_PERIOD)
+                now = Situation(reference, preview, reading)
+                controlling, wanted = self.outer.step(controlling, now, PERIOD)
 
                 sensed = ForceLoopInputs(
-                    wanted.velocity_command,
+                    wanted["velocity_command"],
                     0.0,
                     reading.angle,
                     reading.pressure_lifting,
                     reading.pressure_lowering,
                 )
                 damping = damping or self.force_loop.initial(sensed)
-                damping, valve = self.force_loop.step(damping, sensed, CONTROL_PERIOD)
+                damping, valve = self.force_loop.step(damping, sensed, PERIOD)
 
                 signals = {
                     "reference_stroke": reference.stroke,
@@ -73,7 +78,8 @@ class ClosedLoop:
                     "wanted_velocity": valve.velocity,
                     "saturated": float(valve.saturated),
                 }
-                _append(rows, wanted._asdict() | signals)
+                ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
+                _append(rows, wanted | signals | ahead)
             if tick < last:
                 state, truth = self.plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.run_signals import at, piston
 from emir_analysis.signals import Recording
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, CYLINDER_PREVIEW
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,7 @@ LONGEST_LAG = 1.5  # s
 PAPER_LAG = 0.4  # s, T of law (11)
 BOOM_LENGTH = 22.5  # m, paper 1
 MOVING = 1e-4  # m/s of reference speed
+SEEN_AHEAD = len(CYLINDER_PREVIEW.fields) * CONTROL_PERIOD_NS * 1e-9  # s
 
 
 @dataclass(frozen=True)
@@ -156,10 +158,15 @@ def _tracking_error(run: Recording) -> Array:
 
 
 def _first_move(run: Recording) -> float:
-    """Return the time until which the reference rests, s; at least the first sample's."""
+    """Return the time until which nothing moves, s; at least the first sample's.
+
+    A controller that sees the reference ahead moves before it does.
+    """
     velocity = run["reference_velocity"]
     moving = np.flatnonzero(np.abs(velocity.value) > MOVING)
-    return float(velocity.time[max(moving[0] - 1, 0)] if moving.size else velocity.time[-1])
+    if moving.size == 0:
+        return float(velocity.time[-1])
+    return float(max(velocity.time[max(moving[0] - 1, 0)] - SEEN_AHEAD, velocity.time[0]))
 
 
 def _lag(run: Recording, followed_by: str, reference: str) -> float | None:

@@ -116,6 +116,6 @@ def _values(messages: list[bags.Message], field: str, where: str) -> Array:
             value[k] = float(found)
     except (AttributeError, IndexError):
         raise InputError(f"{where}: message {k} has no field {field}") from None
-    except TypeError:
+    except (TypeError, ValueError):
         raise InputError(f"{where}: field {field} is not a number") from None
     return value

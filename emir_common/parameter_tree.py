@@ -1,6 +1,7 @@
 """Parameter dataclasses nested in one another, seen as a flat table of dotted paths."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from emir_common.quantity import ParameterError, Quantity, quantities
@@ -18,26 +19,33 @@ def declared(tree: Any) -> dict[str, tuple[Quantity, Any]]:
     return table
 
 
-def with_values(tree: Tree, values: dict[str, Any]) -> Tree:
+def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """Return the tree with some quantities replaced, given by dotted path.
 
     Raises ParameterError for a path that does not exist or a value out of range.
     """
+    result: Tree = _replaced(tree, values, "")
+    return result
+
+
+def _replaced(tree: Any, values: Mapping[str, Any], prefix: str) -> Any:
+    new: dict[str, Any] = {}
+    branches: dict[str, dict[str, Any]] = {}
     for path, value in values.items():
-        tree = _replaced(tree, path.split("."), value, path)
-    return tree
-
-
-def _replaced(tree: Any, keys: list[str], value: Any, path: str) -> Any:
-    name, *rest = keys
+        name, _, rest = path.partition(".")
+        if rest:
+            branches.setdefault(name, {})[rest] = value
+        elif name in quantities(tree):
+            quantities(tree)[name].check(prefix + name, value)
+            new[name] = type(getattr(tree, name))(value)
+        else:
+            raise ParameterError(f"{prefix}{name}: there is no such parameter")
     known = {field.name for field in dataclasses.fields(tree)}
-    if name not in known or (rest and not dataclasses.is_dataclass(getattr(tree, name))):
-        raise ParameterError(f"{path}: there is no such parameter")
-    if rest:
-        new = _replaced(getattr(tree, name), rest, value, path)
-    elif name not in quantities(tree):
-        raise ParameterError(f"{path}: there is no such parameter")
-    else:
-        quantities(tree)[name].check(path, value)
-        new = type(getattr(tree, name))(value)
-    return dataclasses.replace(tree, **{name: new})
+    for name, rest_of_it in branches.items():
+        branch = getattr(tree, name) if name in known else None
+        if not dataclasses.is_dataclass(branch):
+            raise ParameterError(
+                f"{prefix}{name}.{next(iter(rest_of_it))}: there is no such parameter"
+            )
+        new[name] = _replaced(branch, rest_of_it, f"{prefix}{name}.")
+    return dataclasses.replace(tree, **new)

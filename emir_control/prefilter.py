@@ -48,6 +48,20 @@ def valve_command(velocity: float, p: PrefilterParameters) -> float:
     return math.copysign(beyond, velocity)
 
 
+def joint_angle(stroke: float, p: PrefilterParameters) -> float:
+    """Return the joint angle, rad, at a piston stroke, m; stroke 0 is at angle 0 (1).
+
+    Not a number where the triangle does not close.
+    """
+    a, b = p.triangle_a, p.triangle_b
+    shortest = a * a + b * b - 2.0 * a * b * math.cos(p.triangle_gamma0)
+    length = math.sqrt(shortest) + stroke
+    cosine = (a * a + b * b - length * length) / (2.0 * a * b)
+    if not abs(cosine) <= 1.0:
+        return math.nan
+    return math.acos(cosine) - p.triangle_gamma0
+
+
 def piston_velocity(joint_rate: float, angle: float, p: PrefilterParameters) -> float:
     """Return the piston velocity, m/s, for a joint rate, rad/s, at the joint angle, rad (1)."""
     a, b, opening = p.triangle_a, p.triangle_b, angle + p.triangle_gamma0

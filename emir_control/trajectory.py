@@ -110,13 +110,19 @@ class AwayAndBack:
         self, state: TrajectoryState, inputs: TrajectoryInputs, dt: float
     ) -> tuple[TrajectoryState, Reference]:
         """Return the reference of this control period of dt, s."""
-        p, time = self.parameters, state.ticks * dt
+        reference = self._at(state, state.ticks * dt)
+        return TrajectoryState(state.start, state.ticks + 1), reference
+
+    def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
+        """Return the strokes, m, of the `count` periods that follow the next step's own."""
+        return tuple(self._at(state, (state.ticks + k) * dt).stroke for k in range(1, count + 1))
+
+    def _at(self, state: TrajectoryState, time: float) -> Reference:
+        """Return the reference `time` s after the start."""
+        p = self.parameters
         away = self._move.at(time - p.delay)
         back = self._move.at(time - p.delay - self._move.duration - p.pause)
-        reference = Reference(
-            state.start + away.stroke - back.stroke, away.velocity - back.velocity
-        )
-        return TrajectoryState(state.start, state.ticks + 1), reference
+        return Reference(state.start + away.stroke - back.stroke, away.velocity - back.velocity)
 
 
 def named(name: str, parameters: TrajectoryParameters) -> AwayAndBack:

@@ -30,6 +30,7 @@ class Topic:
     name: relative. publisher: the node that publishes it. every: once a plant or control period.
     quality: sensor data are best effort for whoever asks for it, commands reliable.
     fields: signal -> field. names: the `name` list of a JointState.
+    instead: nodes that publish it in the publisher's place, when they are the ones that run.
     """
 
     name: str
@@ -40,13 +41,23 @@ class Topic:
     fields: dict[str, Field]
     names: tuple[str, ...] = ()
     frame: str = ""
+    instead: tuple[str, ...] = ()
+
+    @property
+    def publishers(self) -> tuple[str, ...]:
+        """Return the nodes of which one publishes it."""
+        return (self.publisher, *self.instead)
 
 
 def _named_numbers(
-    name: str, publisher: str, every: Literal["plant", "control"], units: dict[str, str]
+    name: str,
+    publisher: str,
+    every: Literal["plant", "control"],
+    units: dict[str, str],
+    quality: Literal["sensor", "command"] = "sensor",
 ) -> Topic:
     fields = {key: Field(f"position[{i}]", unit) for i, (key, unit) in enumerate(units.items())}
-    return Topic(name, JOINT_STATE, publisher, every, "sensor", fields, tuple(units))
+    return Topic(name, JOINT_STATE, publisher, every, quality, fields, tuple(units))
 
 
 JOINT_STATES = Topic(
@@ -121,6 +132,13 @@ CYLINDER_REFERENCE = Topic(
     ("cylinder1",),
     "cylinder1",
 )
+CYLINDER_PREVIEW = _named_numbers(  # paper 3.3: N = 20 control periods
+    "cylinder_preview",
+    "trajectory_node",
+    "control",
+    {f"reference_stroke_{k}_ahead": "m" for k in range(1, 21)},
+    "command",
+)
 VELOCITY_COMMAND = Topic(
     "velocity_command",
     JOINT_STATE,
@@ -130,6 +148,7 @@ VELOCITY_COMMAND = Topic(
     {"velocity_command": Field("velocity[0]", "m/s")},
     ("cylinder1",),
     "cylinder1",
+    ("pfc_node", "pfc_tip_node"),
 )
 VALVE_COMMAND = Topic(
     "valve_command",
@@ -147,6 +166,19 @@ CASCADE_TERMS = _named_numbers(
     "control",
     {"feedforward": "m/s", "feedback": "m/s", "smoothed_reference": "m"},
 )
+
+
+def _pfc_terms(name: str, output_unit: str) -> Topic:
+    terms = dict.fromkeys(
+        ("unlimited", "reference_term", "model_term", "command_term", "error_term"), "m/s"
+    )
+    terms |= {"model_error": output_unit, "limited": "1"}
+    units = {f"{name}_{term}": unit for term, unit in terms.items()}
+    return _named_numbers(f"{name}/terms", f"{name}_node", "control", units)
+
+
+PFC_TERMS = _pfc_terms("pfc", "m")
+PFC_TIP_TERMS = _pfc_terms("pfc_tip", "rad")
 FORCE_LOOP_TERMS = _named_numbers(
     "force_loop/terms",
     "force_loop_node",
@@ -156,7 +188,8 @@ FORCE_LOOP_TERMS = _named_numbers(
 
 TOPICS: tuple[Topic, ...] = (
     JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING, BOOM_DEFLECTION, TRUTH,
-    CYLINDER_REFERENCE, VELOCITY_COMMAND, VALVE_COMMAND, CASCADE_TERMS, FORCE_LOOP_TERMS,
+    CYLINDER_REFERENCE, CYLINDER_PREVIEW, VELOCITY_COMMAND, VALVE_COMMAND,
+    CASCADE_TERMS, PFC_TERMS, PFC_TIP_TERMS, FORCE_LOOP_TERMS,
 )  # fmt: skip
 
 RECORDED = "recorder/recorded"  # std_msgs/Header: all up to this stamp is in the file (lock step)

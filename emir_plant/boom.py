@@ -39,6 +39,7 @@ class BoomModes:
     weight: (m,) generalised gravity of the horizontal boom.
     deflection: (m,) m, displacement of the TCP off the line of the first section, up positive.
     residual_sag: m, what the modes left out add to that, horizontal boom at rest.
+    residual_compliance: m/N, what they add for a force across the boom at the TCP.
     """
 
     frequency: Array
@@ -47,6 +48,7 @@ class BoomModes:
     weight: Array
     deflection: Array
     residual_sag: float
+    residual_compliance: float
 
 
 def section_model(geometry: Geometry) -> SectionModel:
@@ -94,24 +96,26 @@ def boom_modes(geometry: Geometry) -> BoomModes:
     line = np.zeros_like(model.tip)
     line[0] = model.tip.sum()
     deflection = (model.tip - line) @ shapes
-    static = _static_deflections(squares, shapes, deflection, model.weight)
+    sag = _static_deflections(squares, shapes, deflection, -model.weight)
+    yielding = _static_deflections(squares, shapes, deflection, model.tip)
     return BoomModes(
         frequency=np.sqrt(np.clip(squares[:kept], 0.0, None)) * (np.arange(kept) > 0),
         joint=shapes[0, :kept],
         tip_angle=shapes[-1, :kept],
         weight=shapes[:, :kept].T @ model.weight,
         deflection=deflection[:kept],
-        residual_sag=float(static[kept:].sum()),
+        residual_sag=float(sag[kept:].sum()),
+        residual_compliance=float(yielding[kept:].sum()),
     )
 
 
-def _static_deflections(squares: Array, shapes: Array, deflection: Array, weight: Array) -> Array:
-    """Return each mode's part of the TCP's static deflection, m, horizontal boom.
+def _static_deflections(squares: Array, shapes: Array, deflection: Array, force: Array) -> Array:
+    """Return each mode's part of the TCP's static deflection, m, under a generalised force, (n,).
 
-    The joint torque that carries the weight acts on the first section; together they leave the
-    rigid mode (index 0) at rest.
+    The joint torque that carries it acts on the first section; together they leave the rigid
+    mode (index 0) at rest.
     """
-    load = -(shapes.T @ weight)
+    load = shapes.T @ force
     torque = -load[0] / shapes[0, 0]
     load += torque * shapes[0]
     parts = np.zeros_like(load)

@@ -1,7 +1,7 @@
 """The compiled core: the right-hand side of joint 1's integrated model and its integration.
 
-The state vector holds the hydraulic states at the indices named here, then the boom's modal
-coordinates and then their rates.
+The state vector holds the hydraulic states at the indices named here, then time and the memory
+of effects, then the boom's modal coordinates and then their rates.
 """
 
 import math
@@ -11,15 +11,30 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import linkage
-from emir_plant.effects import terms
+from emir_plant.effects import (
+    backlash,
+    command_delay,
+    external_load,
+    linkage_error,
+    sensor_delay,
+    supply_pressure_droop,
+    terms,
+    valve_hysteresis,
+)
 from emir_plant.hydraulics import chambers, logic_block, valve
-from emir_plant.hydraulics.flows import flows
+from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled, compiled_parallel
 
 Array = NDArray[np.float64]
 
-P_H, P_S, SPOOL, SPOOL_RATE, LOGIC, MODES = 0, 1, 2, 3, 4, 5
+P_H, P_S, SPOOL, SPOOL_RATE, LOGIC = 0, 1, 2, 3, 4
+TIME = 5  # s, since the start of the run
+DROOP = 6  # Pa, of the supply pressure
+EDGES = 7  # 1, where the play of the spool has left the metering edges
+OFFSET = 8  # m, of the piston against the joint
+SHOWN_ANGLE, SHOWN_P_H, SHOWN_P_S, SHOWN_DEFLECTION = 9, 10, 11, 12  # by sensors that lag
+DELAY_LINE = 13  # of the command, see command_delay.py
+MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 
@@ -50,41 +65,110 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
+class _Motion(NamedTuple):
+    """The boom and the piston at an instant; SI units."""
+
+    angle: float  # alpha_1, rad
+    tip_angle: float  # alpha_6, rad
+    arm: float  # dh/dalpha, m
+    stroke: float  # of the piston, m
+    velocity: float  # of the piston, m/s
+    joint_velocity: float  # the same without the piston's play, m/s
+    force: float  # of the oil on the piston, N
+    offset_rate: float  # of the piston against the joint, m/s
+
+
 @compiled
-def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
-    """Return dx/dt of the integrated model (paper Fig. 6) at the valve command y2."""
-    p = parameters[0]
+def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
     position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
     angle = _dot(p.mode_joint, position)
-    stroke, arm = linkage.stroke(angle, p), linkage.lever_arm(angle, p)
-    velocity = arm * _dot(p.mode_joint, rate)
-
-    opening = valve.opening(x[SPOOL], p)
-    flow_lifting, flow_lowering = flows(opening, x[P_H], x[P_S], x[LOGIC], p)
-    leak = terms.cross_flow(x[P_H], x[P_S], p)
-
-    dx = np.empty_like(x)
-    dx[P_H] = chambers.pressure_rate(
-        flow_lifting - leak,
-        p.area_lifting * velocity,
-        chambers.volume_lifting(stroke, p),
-        x[P_H],
-        p,
+    arm = linkage_error.lever_arm(angle, p)
+    joint_velocity = arm * _dot(p.mode_joint, rate)
+    force = chambers.piston_force(x[P_H], x[P_S], p)
+    offset_rate = backlash.rate(x[OFFSET], force, p)
+    return _Motion(
+        angle,
+        _dot(p.mode_tip_angle, position),
+        arm,
+        linkage_error.stroke(angle, p) + x[OFFSET],
+        joint_velocity + offset_rate,
+        joint_velocity,
+        force,
+        offset_rate,
     )
-    dx[P_S] = chambers.pressure_rate(
-        flow_lowering + leak,
-        -p.area_lowering * velocity,
-        chambers.volume_lowering(stroke, p),
-        x[P_S],
-        p,
-    )
+
+
+@compiled
+def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
+    """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
+    edges = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
+    opening = terms.opening(valve.opening(edges, p), x[TIME], p)
+    pressures = Pressures(p.p0 - x[DROOP], x[P_H], x[P_S])
+    lifting, lowering = flows(opening, pressures, x[LOGIC], p)
+    return lifting, lowering, delivered(opening, lifting, lowering)
+
+
+@compiled
+def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
+    """Return dx/dt of the integrated model (paper Fig. 6) with a command at the valve.
+
+    That is the command y2 behind the delay line, on which only time and `advance` work.
+    """
+    dx = np.zeros_like(x)
+    write_derivative(x, command, parameters, dx)
+    return dx
+
+
+@compiled
+def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
+    """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
+    p = parameters[0]
+    motion = _motion(x, p)
+    flow_lifting, flow_lowering, pumped = _valve_flows(x, p)
+    leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
+    lifting = flow_lifting - leak_lifting - chambers.relief_flow(x[P_H], p)
+    volume = chambers.volume_lifting(motion.stroke, p)
+    stiffness = terms.stiffness(x[P_H], volume, p.vessel_compliance_lifting, p)
+    surplus = lifting - p.area_lifting * motion.velocity
+    dx[P_H] = chambers.pressure_rate(surplus, volume, x[P_H], stiffness)
+
+    lowering = flow_lowering - leak_lowering - chambers.relief_flow(x[P_S], p)
+    volume = chambers.volume_lowering(motion.stroke, p)
+    stiffness = terms.stiffness(x[P_S], volume, p.vessel_compliance_lowering, p)
+    surplus = lowering + p.area_lowering * motion.velocity
+    dx[P_S] = chambers.pressure_rate(surplus, volume, x[P_S], stiffness)
+
     dx[SPOOL] = x[SPOOL_RATE]
     dx[SPOOL_RATE] = valve.spool_acceleration(command, x[SPOOL], x[SPOOL_RATE], p)
-    dx[LOGIC] = logic_block.opening_rate(x[LOGIC], x[P_H], p)
+    pilot = logic_block.pilot_pressure(x[P_H], x[P_S], p)
+    dx[LOGIC] = logic_block.opening_rate(x[LOGIC], pilot, p)
+    dx[TIME] = 1.0
+    dx[DROOP] = supply_pressure_droop.rate(x[DROOP], pumped, p)
+    dx[EDGES] = valve_hysteresis.rate(x[SPOOL], x[EDGES], p)
+    dx[OFFSET] = motion.offset_rate
+    _write_lags(x, motion, p, dx)
+    _write_boom(x, motion, p, dx)
 
-    torque = (chambers.piston_force(x[P_H], x[P_S], p) - terms.friction(velocity, p)) * arm
-    gravity = math.cos(angle)
+
+@compiled
+def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
+    bending = motion.tip_angle - motion.angle
+    rate = sensor_delay.rate
+    dx[SHOWN_ANGLE] = rate(motion.angle, x[SHOWN_ANGLE], p.sensor_delay_angle)
+    dx[SHOWN_P_H] = rate(x[P_H], x[SHOWN_P_H], p.sensor_delay_pressure_lifting)
+    dx[SHOWN_P_S] = rate(x[P_S], x[SHOWN_P_S], p.sensor_delay_pressure_lowering)
+    dx[SHOWN_DEFLECTION] = rate(bending, x[SHOWN_DEFLECTION], p.sensor_delay_deflection)
+
+
+@compiled
+def _write_boom(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
+    n = p.mode_joint.size
+    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
+    friction = terms.friction(motion.joint_velocity, motion.force, p)
+    torque = (motion.force - friction) * motion.arm
+    gravity = math.cos(motion.angle)
+    load = external_load.force(x[TIME], p)
     for i in range(n):
         dx[MODES + i] = rate[i]
         dx[MODES + n + i] = (
@@ -92,49 +176,65 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
             - p.mode_weight[i] * gravity
             - p.mode_stiffness[i] * position[i]
             - p.mode_damping[i] * rate[i]
+            + p.mode_tip[i] * load
         )
-    return dx
 
 
 @compiled
 def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     """Return what an ideal observer would read off the state."""
     p = parameters[0]
-    n = p.mode_joint.size
-    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
-    angle = _dot(p.mode_joint, position)
-    opening = valve.opening(x[SPOOL], p)
-    flow_lifting, flow_lowering = flows(opening, x[P_H], x[P_S], x[LOGIC], p)
+    motion = _motion(x, p)
+    flow_lifting, flow_lowering, _ = _valve_flows(x, p)
+    bending = _dot(p.mode_deflection, x[MODES : MODES + p.mode_joint.size])
+    load = external_load.force(x[TIME], p)
     return Truth(
-        angle,
-        _dot(p.mode_tip_angle, position),
-        linkage.stroke(angle, p),
-        linkage.lever_arm(angle, p) * _dot(p.mode_joint, rate),
-        chambers.piston_force(x[P_H], x[P_S], p),
+        motion.angle,
+        motion.tip_angle,
+        motion.stroke,
+        motion.velocity,
+        motion.force,
         x[P_H],
         x[P_S],
         flow_lifting,
         flow_lowering,
         x[SPOOL],
         x[LOGIC],
-        _dot(p.mode_deflection, position) + p.residual_sag * math.cos(angle),
+        bending + p.residual_sag * math.cos(motion.angle) + p.residual_compliance * load,
     )
 
 
 @compiled
 def advance(x: Array, command: float, dt: float, parameters: NDArray[Any]) -> Array:
     """Return the state after dt, s, under a constant command; RK4 in steps of at most STEP."""
+    after = x.copy()
+    _advance(after, command, dt, parameters, np.zeros((5, x.size)))
+    return after
+
+
+@compiled
+def _advance(x: Array, command: float, dt: float, parameters: NDArray[Any], work: Array) -> None:
+    """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
+    k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
+    p = parameters[0]
     steps = max(1, math.ceil(dt / STEP - 1e-9))
     h = dt / steps
     for _ in range(steps):
-        k1 = derivative(x, command, parameters)
-        k2 = derivative(x + 0.5 * h * k1, command, parameters)
-        k3 = derivative(x + 0.5 * h * k2, command, parameters)
-        k4 = derivative(x + h * k3, command, parameters)
-        x = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
+        write_derivative(x, arriving, parameters, k1)
+        for i in range(x.size):
+            between[i] = x[i] + 0.5 * h * k1[i]
+        write_derivative(between, arriving, parameters, k2)
+        for i in range(x.size):
+            between[i] = x[i] + 0.5 * h * k2[i]
+        write_derivative(between, arriving, parameters, k3)
+        for i in range(x.size):
+            between[i] = x[i] + h * k3[i]
+        write_derivative(between, arriving, parameters, k4)
+        for i in range(x.size):
+            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         x[P_H] = max(x[P_H], 0.0)
         x[P_S] = max(x[P_S], 0.0)
-    return x
 
 
 @compiled
@@ -145,12 +245,13 @@ def simulate(x: Array, commands: Array, dt: float, every: int, parameters: NDArr
     start and after every `every` commands.
     """
     result = np.empty((1 + commands.size // every, len(truth(x, parameters))))
+    x, work = x.copy(), np.zeros((5, x.size))
     for k in range(commands.size + 1):
         if k % every == 0:
             for i, value in enumerate(truth(x, parameters)):
                 result[k // every, i] = value
         if k < commands.size:
-            x = advance(x, commands[k], dt, parameters)
+            _advance(x, commands[k], dt, parameters, work)
     return result
 
 

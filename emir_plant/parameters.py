@@ -41,6 +41,12 @@ class Cylinder:
     volume_lifting_0: float = quantity("m^3", 1e-5, 1.0, "V_H0, at h = 0, lines included")
     volume_lowering_0: float = quantity("m^3", 1e-5, 1.0, "V_S0, at h = 0, lines included")
     beta: float = quantity("Pa", 1e7, 3e9, "stiffness of oil and vessels together")
+    relief_pressure: float = quantity(
+        "Pa", 1e6, 1e9, "at which a chamber's relief valve opens; 1e9: none", default=1e9
+    )
+    relief_slope: float = quantity(
+        "m^3/(s Pa)", 0.0, 1e-8, "relief flow per pressure above that", default=1e-9
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +85,10 @@ class Resistances:
 class LogicBlock:
     """Safety logic block: stops the oil leaving the lifting chamber at low pressure."""
 
-    threshold: float = quantity("Pa", 0.0, 5e7, "opens while p_H is above")
+    threshold: float = quantity("Pa", 0.0, 5e7, "opens while the pilot pressure is above")
     time_constant_opening: float = quantity("s", 1e-3, 1.0, "very fast")
     time_constant_closing: float = quantity("s", 1e-3, 5.0, "slow")
+    pilot: int = quantity("1", 0, 1, "pilot chamber: 0 lifting (p_H), 1 lowering (p_S)", default=0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core, linkage
+from emir_plant import core
 from emir_plant.core import Array, Truth
+from emir_plant.effects import backlash, command_delay, external_load, linkage_error
+from emir_plant.hydraulics import logic_block
 from emir_plant.parameters import Machine
 from emir_plant.record import record
 
@@ -22,8 +24,9 @@ class SimulationError(RuntimeError):
 class Plant:
     """The integrated model of paper 2.3, Fig. 6, boom stretched, joints 2-5 locked.
 
-    The state is a float array (5 + 2 m,): pressures, spool, logic block, modal coordinates and
-    rates (indices in `core.py`). The one input is the valve command y2 in [-1, 1].
+    The state is a float array (core.MODES + 2 m,): pressures, spool, logic block, time and the
+    memory of effects, modal coordinates and rates (indices in `core.py`). The one input is the
+    valve command y2 in [-1, 1].
     """
 
     machine: Machine
@@ -34,16 +37,16 @@ class Plant:
         return record(self.machine)
 
     def initial(self, angle: float, pressure_lowering: float | None = None) -> Array:
-        """Return the state at rest, both chambers shut, at the boom angle, rad.
+        """Return the state at rest at t = 0, both chambers shut, at the boom angle, rad.
 
         pressure_lowering: p_S, Pa, the tank's when not given; p_H follows from the balance of
         forces. Raises SimulationError where the cylinder cannot hold the boom.
         """
         p = self.record[0]
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
-        gravity = math.cos(angle)
-        torque = gravity * p["mode_weight"][0] / p["mode_joint"][0]
-        force = torque / linkage.lever_arm(angle, p)
+        load = p["mode_weight"] * math.cos(angle) - p["mode_tip"] * external_load.force(0.0, p)
+        torque = load[0] / p["mode_joint"][0]
+        force = torque / linkage_error.lever_arm(angle, p)
         high = (force + low * p["area_lowering"]) / p["area_lifting"]
         if not 0.0 <= high <= p["p0"]:
             raise SimulationError(
@@ -53,15 +56,20 @@ class Plant:
         modes = p["mode_joint"].size
         x = np.zeros(core.MODES + 2 * modes)
         x[core.P_H], x[core.P_S] = high, low
-        x[core.LOGIC] = 1.0 if high > p["threshold"] else 0.0
+        pilot = logic_block.pilot_pressure(high, low, p)
+        x[core.LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
+        x[core.OFFSET] = backlash.flank(force, p)
+        x[core.DELAY_LINE : core.MODES] = command_delay.empty_line()
         position = x[core.MODES : core.MODES + modes]
-        load = p["mode_joint"] * torque - p["mode_weight"] * gravity
-        position[1:] = load[1:] / p["mode_stiffness"][1:]
+        bent = p["mode_joint"] * torque - load
+        position[1:] = bent[1:] / p["mode_stiffness"][1:]
         position[0] = (angle - p["mode_joint"][1:] @ position[1:]) / p["mode_joint"][0]
+        x[core.SHOWN_ANGLE], x[core.SHOWN_P_H], x[core.SHOWN_P_S] = angle, high, low
+        x[core.SHOWN_DEFLECTION] = p["mode_tip_angle"] @ position - angle
         return x
 
     def derivative(self, state: Array, command: float) -> Array:
-        """Return dx/dt, same shape as the state."""
+        """Return dx/dt, same shape as the state, with a command that has arrived at the valve."""
         return core.derivative(state, command, self.record)
 
     def outputs(self, state: Array) -> Truth:

@@ -49,5 +49,7 @@ def _modes(modes: BoomModes, geometry: Geometry) -> dict[str, Any]:
         "mode_tip_angle": modes.tip_angle,
         "mode_weight": modes.weight,
         "mode_deflection": modes.deflection,
+        "mode_tip": geometry.boom_length * modes.joint + modes.deflection,
         "residual_sag": modes.residual_sag,
+        "residual_compliance": modes.residual_compliance,
     }

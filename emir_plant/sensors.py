@@ -1,12 +1,21 @@
-"""The sensors of the paper: 12-bit joint resolver, pressure transducers, strain gauge."""
+"""The sensors of the paper: 12-bit joint resolver, pressure transducers, strain gauge.
+
+The stroke is computed from the resolver by the stated linkage, whatever the linkage is as built;
+the force from the measured pressures.
+"""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from emir_plant import linkage
-from emir_plant.core import Truth
+from emir_plant import core, linkage
+from emir_plant.core import Array, Truth
+from emir_plant.effects import sensor_delay
+from emir_plant.jit import compiled
+from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 
 
@@ -21,28 +30,125 @@ class Measurement(NamedTuple):
     deflection: float  # alpha_6 - alpha_1 by strain gauges, rad
 
 
+class Readings(NamedTuple):
+    """What the sensors show along a run before noise and quantisation, each (n,), SI units.
+
+    Fields as in Measurement.
+    """
+
+    angle: Array
+    stroke: Array
+    pressure_lifting: Array
+    pressure_lowering: Array
+    force: Array
+    deflection: Array
+
+
+# each sensor's field in the effects of sensors, and where the state holds what it shows lagging
+_LAGGING = {
+    "angle": core.SHOWN_ANGLE,
+    "pressure_lifting": core.SHOWN_P_H,
+    "pressure_lowering": core.SHOWN_P_S,
+    "deflection": core.SHOWN_DEFLECTION,
+}
+
+
 def resolver(angle: float, bits: int, span: float) -> float:
     """Return the angle, rad, rounded to the nearest of 2^bits steps of the span, rad."""
     step = span / 2.0**bits
     return math.floor(angle / step + 0.5) * step
 
 
-def measure(plant: Plant, truth: Truth, sample: int) -> Measurement:
+def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None) -> Measurement:
     """Return what the sensors show of the truth at a sample.
 
     The noise depends on the seed and the sample's number alone, so that a run can be repeated
-    from any point.
+    from any point. state: the plant's, which holds what lagging sensors show. Raises ValueError
+    where one lags (effect `sensor_delay`) and no state is given.
     """
-    sensors, cylinder = plant.machine.sensors, plant.machine.cylinder
+    machine = plant.machine
+    sensors, cylinder = machine.sensors, machine.cylinder
     noise = np.random.default_rng((sensors.seed, sample)).standard_normal(3).tolist()
-    angle = resolver(truth.angle, sensors.resolver_bits, sensors.resolver_span)
-    lifting = truth.pressure_lifting + sensors.pressure_noise * noise[0]
-    lowering = truth.pressure_lowering + sensors.pressure_noise * noise[1]
+    true = {
+        "angle": truth.angle,
+        "pressure_lifting": truth.pressure_lifting,
+        "pressure_lowering": truth.pressure_lowering,
+        "deflection": truth.tip_angle - truth.angle,
+    }
+    for name, index in _LAGGING.items():
+        if getattr(machine.effects.sensor_delay, name) > 0.0:
+            if state is None:
+                raise ValueError(f"effects.sensor_delay.{name}: the plant's state is needed")
+            true[name] = float(state[index])
+    shown = {name: _distorted(value, name, machine) for name, value in true.items()}
+    angle = resolver(shown["angle"], sensors.resolver_bits, sensors.resolver_span)
+    lifting = shown["pressure_lifting"] + sensors.pressure_noise * noise[0]
+    lowering = shown["pressure_lowering"] + sensors.pressure_noise * noise[1]
     return Measurement(
         angle=angle,
         stroke=linkage.stroke(angle, plant.record[0]),
         pressure_lifting=lifting,
         pressure_lowering=lowering,
         force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
-        deflection=truth.tip_angle - truth.angle + sensors.deflection_noise * noise[2],
+        deflection=shown["deflection"] + sensors.deflection_noise * noise[2],
     )
+
+
+def readings(plant: Plant, truth: Array, period: float) -> Readings:
+    """Return what the plant's sensors show along a run, without noise and quantisation.
+
+    truth: (n, len(Truth)), from a run that starts at rest. period: s, between its rows; a lag
+    takes the signals as straight between them.
+    """
+    machine, cylinder = plant.machine, plant.machine.cylinder
+    columns = Truth(*truth.T)
+    true: dict[str, Any] = {
+        "angle": columns.angle,
+        "pressure_lifting": columns.pressure_lifting,
+        "pressure_lowering": columns.pressure_lowering,
+        "deflection": columns.tip_angle - columns.angle,
+    }
+    shown = {
+        name: _distorted(
+            _lagged(signal, getattr(machine.effects.sensor_delay, name), period), name, machine
+        )
+        for name, signal in true.items()
+    }
+    lifting, lowering = shown["pressure_lifting"], shown["pressure_lowering"]
+    return Readings(
+        stroke=_strokes(shown["angle"], plant.record),
+        force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
+        **shown,
+    )
+
+
+def _distorted(true: Any, name: str, machine: Machine) -> Any:
+    """Return what a sensor of a gain and a bias shows of a number or an array."""
+    gain, bias = machine.effects.sensor_gain, machine.effects.sensor_bias
+    return true * (1.0 + getattr(gain, name)) + getattr(bias, name)
+
+
+def undistorted(shown: float, name: str, machine: Machine) -> float:
+    """Return what a sensor of a gain and a bias was given when it shows a value at rest."""
+    gain, bias = machine.effects.sensor_gain, machine.effects.sensor_bias
+    return float((shown - getattr(bias, name)) / (1.0 + getattr(gain, name)))
+
+
+def _lagged(signal: Array, lag: float, period: float) -> Array:
+    """Return a signal, (n,), behind a first-order lag, s, exactly for straight pieces."""
+    if lag == 0.0:
+        return signal
+    ratio = period / max(lag, sensor_delay.SHORTEST)
+    decay = math.exp(-ratio)
+    mean = -math.expm1(-ratio) / ratio  # of the decay over a period
+    start = (mean - decay) * signal[0] + decay * signal[0]
+    shown, _ = lfilter([1.0 - mean, mean - decay], [1.0, -decay], signal, zi=[start])
+    return np.asarray(shown)
+
+
+@compiled
+def _strokes(angles: Array, parameters: NDArray[Any]) -> Array:
+    result = np.empty_like(angles)
+    for k in range(angles.size):
+        result[k] = linkage.stroke(angles[k], parameters[0])
+    return result

@@ -3,6 +3,7 @@
 An entry is `name: {value, unit, source, tol}`. `tol` is the maker's relative tolerance; an
 entry with a tolerance and no value stands for a factor of 1. Entries may be grouped as a map
 of plain numbers (`resolver: {bits: 12, span: 1.57}` means resolver_bits, resolver_span).
+Effects are switched on by name: `effects: {coulomb_friction: {force: 3.0e+3}}`.
 """
 
 import dataclasses
@@ -14,8 +15,10 @@ from typing import Any, get_type_hints
 import yaml
 
 from emir_common.quantity import ParameterError, quantities
-from emir_plant.effects import Effects
+from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
+
+EFFECTS = "effects."  # in front of an effect's name in a dotted path
 
 
 @dataclass(frozen=True)
@@ -59,19 +62,20 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
 def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     entries = {
         f"{group}.{name}": entry
-        for group, members in content.items()
-        if isinstance(members, dict)
+        for group, members in _groups(content).items()
         for name, entry in _entries(members).items()
     }
     kinds = {name: kind for name, kind in get_type_hints(Machine).items() if kind is not Effects}
+    kinds |= {EFFECTS + name: kind for name, kind in REGISTRY.items()}
     known = {
         f"{g}.{name}": about
         for g, kind in kinds.items()
         for name, about in quantities(kind).items()
     }
     unknown = tuple(path for path in entries if path not in known)
-    if strict and unknown:
-        raise ParameterError(f"{unknown[0]}: there is no such parameter")
+    wrong = unknown if strict else [path for path in unknown if path.startswith(EFFECTS)]
+    if wrong:
+        raise ParameterError(f"{wrong[0]}: there is no such parameter")
     values: dict[str, float] = {}
     for path, about in known.items():
         entry = entries.get(path)
@@ -81,13 +85,32 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
             raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
         values[path] = _number(entry.get("value", 1.0), path)
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
+    effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
     stated = {path: entries[path] for path in values}
     return Sheet(
-        machine=Machine(**groups),
+        machine=Machine(**groups, effects=effects),
         tolerances={path: float(e["tol"]) for path, e in stated.items() if "tol" in e},
         sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
         ignored=unknown,
     )
+
+
+def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the groups of parameters in a file by dotted path, each effect being one.
+
+    Raises ParameterError where something else stands for the effects or for one of them.
+    """
+    effects = content.get("effects") or {}
+    if not isinstance(effects, dict):
+        raise ParameterError(f"effects = {effects!r}: not a map of effects by name")
+    for name, members in effects.items():
+        if name not in REGISTRY:
+            raise ParameterError(f"effects.{name}: there is no such effect")
+        if not isinstance(members, dict):
+            raise ParameterError(f"effects.{name} = {members!r}: not a map of its parameters")
+    others = {name: group for name, group in content.items() if isinstance(group, dict)}
+    others.pop("effects", None)
+    return others | {EFFECTS + name: members for name, members in effects.items()}
 
 
 def _number(value: Any, path: str) -> float:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from emir_plant import linkage
 from emir_plant.core import Array
+from emir_plant.effects import linkage_error
 from emir_plant.plant import Plant
 
 
@@ -110,10 +110,9 @@ def mechanics(plant: Plant, angle: float) -> Mechanics:
     """
     p = plant.record[0]
     force = plant.outputs(plant.initial(angle)).force
-    arm = linkage.lever_arm(angle, p)
-    length = linkage.cylinder_length(angle, p)
-    cosine = math.cos(angle + p["triangle_gamma0"])
-    slope = (p["triangle_a"] * p["triangle_b"] * cosine - arm * arm) / length
+    arm, d = linkage_error.lever_arm(angle, p), 1e-5
+    slope = linkage_error.lever_arm(angle + d, p) - linkage_error.lever_arm(angle - d, p)
+    slope /= 2.0 * d
     return Mechanics(
         damping=p["mode_damping"],
         stiffness=p["mode_stiffness"],

@@ -14,9 +14,15 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.topics import TOPICS
 
-CONTROLLERS = {"cascade": ("trajectory_node", "cascade_node", "force_loop_node")}
-NODES = ("recorder_node", "trajectory_node", "cascade_node", "force_loop_node", "plant_node")
+CONTROLLERS = {
+    name: ("trajectory_node", f"{name}_node", "force_loop_node")
+    for name in ("cascade", "pfc", "pfc_tip")
+}
+NODES = tuple(dict.fromkeys(  # each once
+    ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes), "plant_node")
+))  # fmt: skip
 EVERY_NODE = "/**"
 
 
@@ -39,6 +45,11 @@ class Plan:
     def nodes(self) -> tuple[str, ...]:
         """Return the names of the run's nodes, the plant last."""
         return ("recorder_node", *CONTROLLERS[self.controller], "plant_node")
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Return the names of the topics that these nodes publish, in the table's order."""
+        return tuple(t.name for t in TOPICS if not set(t.publishers).isdisjoint(self.nodes))
 
 
 def check(plan: Plan) -> None:
@@ -118,9 +129,16 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
         EVERY_NODE: {"lockstep": plan.lockstep},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
         "trajectory_node": {"trajectory": plan.trajectory},
-        "recorder_node": {"bag": str(plan.bag), "description": json.dumps(_description(plan))},
+        "recorder_node": {
+            "bag": str(plan.bag),
+            "description": json.dumps(_description(plan)),
+            "topics": list(plan.topics),
+        },
     }
-    return {node: {"ros__parameters": values} for node, values in nodes.items()}
+    return {
+        node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
+        for node, values in nodes.items()
+    }
 
 
 def _description(plan: Plan) -> dict[str, str]:

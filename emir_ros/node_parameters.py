@@ -1,6 +1,8 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
-from typing import Any, TypeVar
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
@@ -8,6 +10,8 @@ from rclpy.node import Node
 
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError, Quantity
+from emir_control import pfc_file
+from emir_control.pfc import Form, Future, PfcParameters
 
 Tree = TypeVar("Tree")
 
@@ -26,6 +30,26 @@ def declare_tree(node: Node, tree: Tree) -> Tree:
         return with_values(tree, values)
     except ParameterError as error:
         raise ParameterError(f"{node.get_name()}: {error}") from None
+
+
+def declare_pfc(node: Node, output: str) -> PfcParameters:
+    """Declare a predictive controller's design file and, on top of it, its tuning.
+
+    Raises ParameterError, naming node and parameter or file.
+    """
+    about = "YAML made by emir design; empty: the one that comes with the project"
+    file = declare(node, "model_file", "", about)
+    try:
+        design = pfc_file.load(Path(file) if file else pfc_file.default_file(output), output)
+        design = replace(
+            design,
+            form=declare(node, "form", design.form, ", ".join(get_args(Form))),
+            future=declare(node, "future", design.future, ", ".join(get_args(Future))),
+        )
+    except ParameterError as error:
+        name = f"{node.get_name()}: "
+        raise ParameterError(name + str(error).removeprefix(name)) from None
+    return declare_tree(node, design)
 
 
 def declare(node: Node, name: str, default: Any, description: str) -> Any:

@@ -98,7 +98,7 @@ class PlantNode(Shell):
         self.tick += 1
 
     def _publish_sensors(self, stamp: int) -> None:
-        reading = measure(self.plant, self.truth, self.tick)
+        reading = measure(self.plant, self.truth, self.tick, self.state)
         signals = reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
         for topic in OUTPUTS:
             self.publish(topic, stamp, signals)
@@ -163,25 +163,36 @@ class PlantNode(Shell):
             " listens to) running?"
         )
 
-    # real time: one plant period each timer tick, with the latest command
+    # real time: simulated time keeps up with the clock, with the latest command
 
     def _start_realtime(self) -> None:
         self._command_received = -math.inf
+        self._started = time.monotonic()
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
 
     def _on_timer(self) -> None:
-        age = time.monotonic() - self._command_received
-        command = self._command[1] if self._command else 0.0
-        if self._command is not None and age > self.own.command_timeout:
-            command = 0.0
+        due = int((time.monotonic() - self._started) / (PLANT_PERIOD_NS * 1e-9))
+        if due - self.tick > CONTROL_PERIOD_NS // PLANT_PERIOD_NS:
             self.get_logger().warning(
-                f"no fresh {VALVE_COMMAND.name}: valve shut", throttle_duration_sec=2.0
+                f"{due - self.tick} plant periods late", throttle_duration_sec=2.0
             )
-        self._step(command)
+        command = self._fresh_command()
+        while self.tick < due:  # a late timer catches up
+            self._step(command)
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self._show_progress()
         self.done = self._is_over()
+
+    def _fresh_command(self) -> float:
+        if self._command is None:
+            return 0.0
+        if time.monotonic() - self._command_received > self.own.command_timeout:
+            self.get_logger().warning(
+                f"no fresh {VALVE_COMMAND.name}: valve shut", throttle_duration_sec=2.0
+            )
+            return 0.0
+        return self._command[1]
 
     def _on_command(self, message: Any) -> None:
         command = conversions.values(VALVE_COMMAND, message)["valve_command"]

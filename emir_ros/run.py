@@ -118,7 +118,7 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
     processes: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name in plan.nodes:
-            command = [sys.executable, "-m", f"emir_ros.{name}", *ros]
+            command = [sys.executable, "-P", "-m", f"emir_ros.{name}", *ros]
             processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
         _wait_for_plant(processes)
     finally:

@@ -18,11 +18,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.signal import savgol_filter
 
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
-from emir_analysis.diagnosis.free_run import free_runs, outputs
+from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.measured_state import Rates, follow
 from emir_analysis.signals import Array
 from emir_plant import linkage
-from emir_plant.core import Truth
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import resolver
@@ -95,8 +94,10 @@ class Balances:
         return self._mean(signal)
 
     def residuals(self, machines: Sequence[Machine]) -> Array:
-        """Return what is missing in each balance, (m, w, 5), SI units; NaN for a machine that
-        cannot rest at the recording's start."""
+        """Return what is missing in each balance, (m, w, 5), SI units.
+
+        NaN for a machine that cannot rest at the recording's start.
+        """
         experiment = self._experiment
         plants = [Plant(machine) for machine in machines]
         angle, pressure = experiment.start()
@@ -118,7 +119,9 @@ class Balances:
             return []
         records = np.concatenate([plants[k].record for k in starts])
         every = self._experiment.every
-        stride = max(n for n in range(1, every + 1) if every % n == 0 and n * COMMAND_STEP <= SUBSTEP)
+        stride = max(
+            n for n in range(1, every + 1) if every % n == 0 and n * COMMAND_STEP <= SUBSTEP
+        )
         followed = follow(
             np.array(list(starts.values())),
             self._experiment.commands[::stride],
@@ -180,27 +183,22 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
     Found by simulating the machine under the recorded command, reading it through the sensors'
     noise and quantisation, and computing its balances with its own parameters.
     """
-    truth = free_runs([machine], experiment, [experiment.start()])[0]
-    shown = sensed(experiment, machine, truth)
-    residuals = Balances(shown, machine).residuals([machine])[0]
+    ideal = free_runs([machine], experiment, [experiment.start()])[0]
+    residuals = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
     return np.asarray(np.sqrt(np.mean(np.square(residuals), axis=0)))
 
 
-def sensed(experiment: Experiment, machine: Machine, truth: Array, seed: int = 0) -> Experiment:
-    """Return the experiment as the machine's sensors would have shown the truth, (n, 12)."""
+def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:
+    """Return the experiment as the machine's sensors show ideal readings, (n, 5) as SHOWN."""
     sensors = machine.sensors
     p = Plant(machine).record[0]
-    ideal = outputs(truth)
     angle = np.array(
-        [
-            resolver(a, sensors.resolver_bits, sensors.resolver_span)
-            for a in truth[:, Truth._fields.index("angle")]
-        ]
+        [resolver(a, sensors.resolver_bits, sensors.resolver_span) for a in ideal[:, ANGLE]]
     )
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
     shown = np.column_stack(
-        [np.array([linkage.stroke(a, p) for a in angle]), ideal[:, 1:] + noise * scale]
+        [np.array([linkage.stroke(a, p) for a in angle]), ideal[:, 2:] + noise * scale]
     )
     return Experiment(
         experiment.name, experiment.period, experiment.commands, angle, shown, experiment.rest

@@ -1,6 +1,7 @@
 """A recording as the diagnosis uses it: all sensors on one time grid, the command held between."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,12 +48,22 @@ class Experiment:
     @property
     def time(self) -> Array:
         """Time of the samples, (n,) s."""
-        return np.arange(self.angle.size) * self.period
+        return self.period * np.arange(self.angle.size, dtype=np.float64)
 
     @property
     def every(self) -> int:
         """Steps of the command grid between two samples."""
         return round(self.period / COMMAND_STEP)
+
+    def head(self, share: float) -> "Experiment":
+        """Return the first part of the recording."""
+        samples = int(share * (self.angle.size - 1)) + 1
+        return replace(
+            self,
+            commands=self.commands[: (samples - 1) * self.every],
+            angle=self.angle[:samples],
+            outputs=self.outputs[:samples],
+        )
 
     def start(self) -> tuple[float, float]:
         """Return angle, rad, and p_S, Pa, at rest: the means of the first samples."""
@@ -92,7 +103,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     time = begin + np.arange(int((end - begin + 1e-6) / period) + 1) * period
     angle, *outputs = (np.interp(time, signal.time, signal.value) for signal in sensors)
     commands = _held(recording[COMMAND], begin, every * (time.size - 1))
-    rest = _rest(name, commands, every, period, machine)
+    rest = _rest(name, commands, period, machine)
     _check_motion(name, angle, machine)
     return Experiment(name, period, commands, angle, np.stack(outputs, axis=1), rest)
 
@@ -108,7 +119,7 @@ def noise(machine: Machine) -> Array:
     arm = linkage.lever_arm(np.pi / 4.0, record(machine)[0])
     return np.array(
         [
-            arm * step / np.sqrt(12.0),
+            arm * step / math.sqrt(12.0),
             sensors.pressure_noise,
             sensors.pressure_noise,
             sensors.deflection_noise,
@@ -133,7 +144,7 @@ def _check_sampling(name: str, signal: Signal) -> None:
         )
 
 
-def _rest(name: str, commands: Array, every: int, period: float, machine: Machine) -> int:
+def _rest(name: str, commands: Array, period: float, machine: Machine) -> int:
     moving = np.flatnonzero(np.abs(commands) > machine.valve.dead_zone)
     if moving.size == 0:
         raise InputError(f"{name}: the valve command never leaves the dead zone; nothing moves")

@@ -1,55 +1,59 @@
 """Weighted nonlinear least squares with all finite differences simulated in parallel."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from emir_analysis.signals import Array
 
 STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
-TOLERANCE_SPREAD = 1.0 / np.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
+TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
+EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
-Model = Callable[[Array], Array]  # (m, k) vectors -> (m, n) residuals in units of the noise
+
+@dataclass(frozen=True)
+class Problem:
+    """Residuals to be made small.
+
+    model: (m, k) vectors -> (m, n) residuals in units of the noise. start, low, high: (k,).
+    stated: (k,) true for parameters that a maker states: they are held to their stated value as
+    weakly as their tolerance says, so that what the data cannot tell stays where it is.
+    """
+
+    model: Callable[[Array], Array]
+    start: Array
+    low: Array
+    high: Array
+    stated: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Solution:
-    """x: (k,). spread: (k,) standard deviations from the curvature at the optimum.
-
-    evaluations: of the model, beside those for the Jacobian.
-    """
+    """x: (k,). spread: (k,) standard deviations from the curvature at the optimum."""
 
     x: Array
     spread: Array
-    evaluations: int
 
 
-def fit(
-    model: Model,
-    start: Array,
-    bounds: tuple[Array, Array],
-    stated: Array,
-    robust: bool = False,
-    accuracy: float = 1e-6,
-    evaluations: int = 30,
-) -> Solution:
-    """Minimise the squared residuals of a model inside bounds.
+def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
+    """Minimise the squared residuals of a problem inside its bounds.
 
-    stated: (k,) true for parameters that a maker states: they are held to their stated value as
-    weakly as their tolerance says, so that what the data cannot tell stays where it is.
-    robust: residuals far above the noise count by their size, not by its square.
+    accuracy: relative, of cost and vector. robust: residuals far above the noise count by their
+    size, not by its square.
     """
-    low, high = bounds
-    held = np.flatnonzero(stated)
+    held = np.flatnonzero(problem.stated)
+    low, high = problem.low, problem.high
 
     def residuals(x: Array) -> Array:
-        return np.concatenate([model(x[None])[0], x[held] / TOLERANCE_SPREAD])
+        return np.concatenate([problem.model(x[None])[0], x[held] / TOLERANCE_SPREAD])
 
     def jacobian(x: Array) -> Array:
         steps = np.where(x + STEP > high, -STEP, STEP)
-        values = model(np.vstack([x, x + np.diag(steps)]))
+        values = problem.model(np.vstack([x, x + np.diag(steps)]))
         slopes = (values[1:] - values[0]) / steps[:, None]
         prior = np.eye(x.size)[held] / TOLERANCE_SPREAD
         # a neighbour that cannot be simulated says nothing about the slope
@@ -58,15 +62,16 @@ def fit(
     margin = 1e-6 * (high - low)
     result = least_squares(
         residuals,
-        np.clip(start, low + margin, high - margin),
+        np.clip(problem.start, low + margin, high - margin),
         jac=jacobian,
-        bounds=bounds,
+        bounds=(low, high),
         loss="soft_l1" if robust else "linear",
         xtol=accuracy,
         ftol=accuracy,
-        max_nfev=evaluations,
+        max_nfev=EVALUATIONS,
     )
-    inverse = np.linalg.pinv(result.jac.T @ result.jac)
+    curvature = np.asarray(result.jac)
+    inverse = np.linalg.pinv(curvature.T @ curvature)
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
-    return Solution(result.x, np.sqrt(np.diag(inverse) * excess), result.nfev)
+    return Solution(np.asarray(result.x), np.sqrt(np.diag(inverse) * excess))

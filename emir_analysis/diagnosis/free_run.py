@@ -7,53 +7,53 @@ import numpy as np
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.signals import Array
 from emir_plant import core
-from emir_plant.core import Truth
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
+from emir_plant.sensors import readings, undistorted
 
-_COLUMN = {name: k for k, name in enumerate(Truth._fields)}
-
-
-def outputs(truth: Array) -> Array:
-    """Return the compared outputs (..., 4), in the order of OUTPUTS, of a truth (..., 12)."""
-    deflection = truth[..., _COLUMN["tip_angle"]] - truth[..., _COLUMN["angle"]]
-    measured = [_COLUMN[n] for n in ("stroke", "pressure_lifting", "pressure_lowering")]
-    return np.concatenate([truth[..., measured], deflection[..., None]], axis=-1)
+SHOWN = ("angle", "stroke", "pressure_lifting", "pressure_lowering", "deflection")
+ANGLE = 0  # the resolver's; the others are the compared outputs, in the order of OUTPUTS
 
 
 def free_runs(
     machines: Sequence[Machine], experiment: Experiment, starts: Sequence[tuple[float, float]]
 ) -> Array:
-    """Return the truth, (m, n, 12), of machines started at rest at (angle, rad, and p_S, Pa).
+    """Return what the sensors show, (m, n, 5) in the order of SHOWN, without noise.
 
-    p_H follows from the balance of forces, the logic block is settled. A machine that cannot
-    rest there gives NaN.
+    The machines start at rest at the sensors' (angle, rad, and p_S, Pa); p_H follows from the
+    balance of forces, the logic block is settled. A machine that cannot rest there gives NaN.
     """
     plants = [Plant(machine) for machine in machines]
     states = [_at_rest(plant, *start) for plant, start in zip(plants, starts, strict=True)]
     able = [k for k, state in enumerate(states) if state is not None]
-    result = np.full((len(plants), experiment.angle.size, len(Truth._fields)), np.nan)
-    if able:
-        result[able] = core.simulate_many(
-            np.array([states[k] for k in able]),
-            experiment.commands,
-            COMMAND_STEP,
-            experiment.every,
-            np.concatenate([plants[k].record for k in able]),
-        )
+    result = np.full((len(plants), experiment.angle.size, len(SHOWN)), np.nan)
+    if not able:
+        return result
+    truths = core.simulate_many(
+        np.array([states[k] for k in able]),
+        experiment.commands,
+        COMMAND_STEP,
+        experiment.every,
+        np.concatenate([plants[k].record for k in able]),
+    )
+    for k, truth in zip(able, truths, strict=True):
+        shown = readings(plants[k], truth, experiment.period)
+        result[k] = np.column_stack([getattr(shown, name) for name in SHOWN])
     return result
 
 
 def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | None:
+    true_angle = undistorted(angle, "angle", plant.machine)
+    true_pressure = undistorted(pressure_lowering, "pressure_lowering", plant.machine)
     try:
-        return plant.initial(angle, max(pressure_lowering, 0.0))
+        return plant.initial(true_angle, max(true_pressure, 0.0))
     except SimulationError:
         return None
 
 
 def free_run(machine: Machine, experiment: Experiment) -> Array:
     """Return the outputs, (n, 4), of one machine from the recording's own first samples."""
-    return outputs(free_runs([machine], experiment, [experiment.start()])[0])
+    return free_runs([machine], experiment, [experiment.start()])[0, :, ANGLE + 1 :]
 
 
 def errors(machine: Machine, experiment: Experiment) -> Array:

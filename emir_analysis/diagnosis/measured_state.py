@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
 from emir_plant import core
+from emir_plant.effects import command_delay
 from emir_plant.jit import compiled, compiled_parallel
 
 
@@ -28,54 +29,73 @@ class Rates(NamedTuple):
 
 
 @compiled
-def _derivative(
-    x: Array, command: float, measured: Array, parameters: NDArray[Any]
-) -> tuple[Array, Array]:
-    """Return the state with the measured values in it, and its rates.
+def _write_rates(
+    x: Array, command: float, measured: Array, parameters: NDArray[Any], dx: Array
+) -> None:
+    """Put the measured values into the state x and write its rates to dx.
 
     measured: (4,) p_H, p_S, Pa, boom angle, rad, and its rate, rad/s.
     """
     p = parameters[0]
     n = p.mode_joint.size
-    x = x.copy()
     x[core.P_H], x[core.P_S] = measured[0], measured[1]
-    position, rate = x[core.MODES : core.MODES + n], x[core.MODES + n :]
-    bent = np.dot(p.mode_joint[1:], position[1:])
-    position[0] = (measured[2] - bent) / p.mode_joint[0]
-    rate[0] = (measured[3] - np.dot(p.mode_joint[1:], rate[1:])) / p.mode_joint[0]
-    return x, core.derivative(x, command, parameters)
+    bent, bending = 0.0, 0.0
+    for i in range(1, n):
+        bent += p.mode_joint[i] * x[core.MODES + i]
+        bending += p.mode_joint[i] * x[core.MODES + n + i]
+    x[core.MODES] = (measured[2] - bent) / p.mode_joint[0]
+    x[core.MODES + n] = (measured[3] - bending) / p.mode_joint[0]
+    core.write_derivative(x, command, parameters, dx)
+
+
+@compiled
+def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
+    x: Array, command: float, dt: float, measured: Array, parameters: NDArray[Any], work: Array
+) -> None:
+    """Advance x by dt, s, with RK4. measured: (3, 4) at start, middle and end of the step."""
+    k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
+    _write_rates(x, command, measured[0], parameters, k1)
+    for i in range(x.size):
+        between[i] = x[i] + 0.5 * dt * k1[i]
+    _write_rates(between, command, measured[1], parameters, k2)
+    for i in range(x.size):
+        between[i] = x[i] + 0.5 * dt * k2[i]
+    _write_rates(between, command, measured[1], parameters, k3)
+    for i in range(x.size):
+        between[i] = x[i] + dt * k3[i]
+    _write_rates(between, command, measured[2], parameters, k4)
+    for i in range(x.size):
+        x[i] += dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
 @compiled
 def _follow(
-    x: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
+    start: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
 ) -> Array:
-    """Return (5, n), the columns of Rates along measured (n, 4); RK4 in steps of dt, s."""
+    """Return (5, n), the columns of Rates along measured (n, 4); steps of dt, s."""
     p = parameters[0]
     samples, n = measured.shape[0], p.mode_joint.size
     every = commands.size // (samples - 1)
-    tip = p.mode_tip_angle - p.mode_joint
-    result = np.empty((5, samples))
+    arriving = command_delay.delayed(commands, dt, parameters)
+    x, dx, work = start.copy(), np.zeros(start.size), np.zeros((5, start.size))
+    at = np.empty((3, measured.shape[1]))
+    result = np.zeros((5, samples))
     for k in range(samples):
-        command = commands[min(k * every, commands.size - 1)]
-        state, rates = _derivative(x, command, measured[k], parameters)
-        modes = state[core.MODES + 1 : core.MODES + n]
-        result[0, k], result[1, k] = rates[core.P_H], rates[core.P_S]
-        result[2, k] = p.mode_joint[0] * rates[core.MODES + n]
-        result[3, k] = np.dot(p.mode_joint[1:], modes)
-        result[4, k] = np.dot(tip[1:], modes)
+        _write_rates(x, arriving[min(k * every, commands.size - 1)], measured[k], parameters, dx)
+        result[0, k], result[1, k] = dx[core.P_H], dx[core.P_S]
+        result[2, k] = p.mode_joint[0] * dx[core.MODES + n]
+        for i in range(1, n):
+            bent = x[core.MODES + i]
+            result[3, k] += p.mode_joint[i] * bent
+            result[4, k] += (p.mode_tip_angle[i] - p.mode_joint[i]) * bent
         if k == samples - 1:
             break
         slope = (measured[k + 1] - measured[k]) / every
         for j in range(every):
-            command = commands[k * every + j]
-            at = measured[k] + slope * j
-            between, after = at + 0.5 * slope, at + slope
-            _, k1 = _derivative(x, command, at, parameters)
-            _, k2 = _derivative(x + 0.5 * dt * k1, command, between, parameters)
-            _, k3 = _derivative(x + 0.5 * dt * k2, command, between, parameters)
-            _, k4 = _derivative(x + dt * k3, command, after, parameters)
-            x = x + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+            at[0] = measured[k] + slope * j
+            at[1] = at[0] + 0.5 * slope
+            at[2] = at[0] + slope
+            _step(x, arriving[k * every + j], dt, at, parameters, work)
     return result
 
 

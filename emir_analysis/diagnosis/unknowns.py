@@ -1,15 +1,14 @@
 """What a fit may change: the toleranced parameters and the parameters of effects, as a vector."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine, groups
@@ -77,7 +76,11 @@ class Unknowns:
 
     def at(self, x: Array) -> Machine:
         """Return the machine with the parameters at x."""
-        return with_values(self.machine, self.values(x))
+        return self.machine_with(self.values(x))
+
+    def machine_with(self, values: Mapping[str, float]) -> Machine:
+        """Return the machine with parameters given by dotted path, SI units."""
+        return with_values(self.machine, values)
 
 
 def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
@@ -89,20 +92,6 @@ def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
     return Unknowns(sheet.machine, tuple(members))
 
 
-def with_values(machine: Machine, values: Mapping[str, float]) -> Machine:
-    """Return the machine with parameters replaced by dotted path (`effects.NAME.FIELD` too)."""
-    stated = groups(machine)
-    changed: dict[str, dict[str, float]] = {}
-    for path, value in values.items():
-        group, name = path.rsplit(".", 1)
-        changed.setdefault(group, {})[name] = value
-    new = {group: dataclasses.replace(stated[group], **names) for group, names in changed.items()}
-    effects = {g.removeprefix("effects."): new.pop(g) for g in list(new) if g.startswith("effects.")}
-    return dataclasses.replace(
-        machine, effects=dataclasses.replace(machine.effects, **effects), **new
-    )
-
-
 def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Unknown:
     group, name = path.rsplit(".", 1)
     value = float(getattr(stated[group], name))
@@ -112,10 +101,10 @@ def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Un
 
 def _of_effect(effect: str) -> list[Unknown]:
     kind = REGISTRY[effect]
-    defaults = {f.name: f.default for f in dataclasses.fields(kind)}
+    stated = kind()
     members = []
     for name, about in quantities(kind).items():
-        value = float(kind.trial.get(name, defaults[name]))
+        value = float(kind.trial.get(name, getattr(stated, name)))
         path = f"effects.{effect}.{name}"
         if about.low > 0.0 and about.high / about.low > WIDE:
             low, high = math.log(about.low / value), math.log(about.high / value)

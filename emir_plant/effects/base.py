@@ -1,4 +1,4 @@
-"""What every effect has: a balance it belongs to, a size that switches it on, a source."""
+"""What every effect has: a balance it belongs to, sizes that switch it on, a source."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -11,12 +11,13 @@ class Effect:
     """Base of all effects.
 
     balance: the one balance whose residual shows the effect.
-    size: name of the field that is 0 while the effect is off.
+    sizes: names of the fields that are all 0 while the effect is off; each of them alone
+        switches it on.
     source: where the term and its magnitude come from.
     trial: values at which a search for a missing effect starts, SI units.
     """
 
     balance: ClassVar[Balance]
-    size: ClassVar[str]
+    sizes: ClassVar[tuple[str, ...]]
     source: ClassVar[str]
     trial: ClassVar[dict[str, float]]

@@ -14,7 +14,7 @@ class CoulombFriction(Effect):
     """Force against the motion of the piston: F_c tanh(v / v_0)."""
 
     balance: ClassVar[Balance] = "force"
-    size: ClassVar[str] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = "seal friction, 1-3 % of the load"
     trial: ClassVar[dict[str, float]] = {"force": 3e3}
 

@@ -18,7 +18,7 @@ class EntrainedAir(Effect):
     """
 
     balance: ClassVar[Balance] = "chambers"
-    size: ClassVar[str] = "share"
+    sizes: ClassVar[tuple[str, ...]] = ("share",)
     source: ClassVar[str] = "0.2-2 % of the volume at 1 bar; polytropic mixture"
     trial: ClassVar[dict[str, float]] = {"share": 0.01}
 

@@ -13,7 +13,7 @@ class InternalLeakage(Effect):
     """Laminar flow C_i (p_H - p_S) out of the lifting into the lowering chamber."""
 
     balance: ClassVar[Balance] = "chambers"
-    size: ClassVar[str] = "coefficient"
+    sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
     source: ClassVar[str] = "piston leakage 1e-13 ... 5e-12 m^3/(s Pa)"
     trial: ClassVar[dict[str, float]] = {"coefficient": 1e-12}
 

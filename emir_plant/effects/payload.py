@@ -12,7 +12,7 @@ class Payload(Effect):
     """Point mass at the TCP, added to the stated payload: weight, inertia, other modes."""
 
     balance: ClassVar[Balance] = "force"
-    size: ClassVar[str] = "mass"
+    sizes: ClassVar[tuple[str, ...]] = ("mass",)
     source: ClassVar[str] = "paper 1: up to 1500 kg"
     trial: ClassVar[dict[str, float]] = {"mass": 100.0}
 

@@ -14,7 +14,7 @@ class StribeckFriction(Effect):
     """Force against the motion: tanh(v/v_0) F_c [1 + (b - 1) exp(-(v/v_s)^2)]."""
 
     balance: ClassVar[Balance] = "force"
-    size: ClassVar[str] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = "breakaway 1.3 times the sliding force, v_s 5-10 mm/s"
     trial: ClassVar[dict[str, float]] = {"force": 3e3, "breakaway": 1.5, "stribeck_speed": 7e-3}
 

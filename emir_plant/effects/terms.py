@@ -2,23 +2,51 @@
 
 from typing import Any
 
-from emir_plant.effects import coulomb_friction, entrained_air, internal_leakage, stribeck_friction
+from emir_plant.effects import (
+    coulomb_friction,
+    entrained_air,
+    external_leakage,
+    flow_gain_drift,
+    internal_leakage,
+    pressure_dependent_friction,
+    stribeck_friction,
+    valve_gain_asymmetry,
+    vessel_compliance,
+    viscous_friction,
+)
 from emir_plant.jit import compiled
 
 
 @compiled
-def friction(velocity: float, p: Any) -> float:
-    """Return the force against the piston's motion, N, at the piston velocity, m/s."""
-    return coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
+def friction(velocity: float, load: float, p: Any) -> float:
+    """Return the force against the piston's motion, N, at its velocity, m/s.
+
+    load: force of the oil on the piston, N.
+    """
+    dry = coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
+    dry += pressure_dependent_friction.friction(velocity, load, p)
+    return dry + viscous_friction.friction(velocity, p)
 
 
 @compiled
-def cross_flow(pressure_lifting: float, pressure_lowering: float, p: Any) -> float:
-    """Return the flow from the lifting to the lowering chamber, m^3/s; pressures in Pa."""
-    return internal_leakage.flow(pressure_lifting, pressure_lowering, p)
+def leakage(pressure_lifting: float, pressure_lowering: float, p: Any) -> tuple[float, float]:
+    """Return the flows that leave the lifting and the lowering chamber, m^3/s; pressures in Pa."""
+    across = internal_leakage.flow(pressure_lifting, pressure_lowering, p)
+    lifting = external_leakage.flow(pressure_lifting, p.external_leakage_lifting, p)
+    lowering = external_leakage.flow(pressure_lowering, p.external_leakage_lowering, p)
+    return across + lifting, lowering - across
 
 
 @compiled
-def stiffness(pressure: float, p: Any) -> float:
-    """Return the stiffness beta of a chamber's content, Pa, at its pressure, Pa."""
-    return entrained_air.stiffness(pressure, p)
+def stiffness(pressure: float, volume: float, compliance: float, p: Any) -> float:
+    """Return the stiffness beta of a chamber, Pa, at its pressure, Pa, and volume, m^3.
+
+    compliance: of its vessels beyond the stated stiffness, m^3/Pa.
+    """
+    return vessel_compliance.stiffness(entrained_air.stiffness(pressure, p), volume, compliance)
+
+
+@compiled
+def opening(stated: float, time: float, p: Any) -> float:
+    """Return the opening of the metering edges at a time, s, from the one as stated."""
+    return valve_gain_asymmetry.scaled(stated, p) * flow_gain_drift.gain(time, p)

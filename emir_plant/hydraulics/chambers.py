@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from emir_plant.effects import terms
 from emir_plant.jit import compiled
 
 
@@ -19,14 +18,20 @@ def volume_lowering(stroke: float, p: Any) -> float:
 
 
 @compiled
-def pressure_rate(flow: float, swept: float, volume: float, pressure: float, p: Any) -> float:
+def pressure_rate(surplus: float, volume: float, pressure: float, stiffness: float) -> float:
     """Return dp/dt, Pa/s, of one chamber (5), (6).
 
-    flow into it and the swept volume rate that makes room, m^3/s; volume, m^3; pressure, Pa.
-    Oil does not pull: at 0 the pressure does not fall further.
+    surplus: flow into it less the swept volume rate that makes room, m^3/s; volume, m^3;
+    pressure and stiffness, Pa. Oil does not pull: at 0 the pressure does not fall further.
     """
-    rate = (flow - swept) * terms.stiffness(pressure, p) / volume
+    rate = surplus * stiffness / volume
     return max(rate, 0.0) if pressure <= 0.0 else rate
+
+
+@compiled
+def relief_flow(pressure: float, p: Any) -> float:
+    """Return what a chamber's relief valve lets off to the tank, m^3/s, at its pressure, Pa."""
+    return p.relief_slope * max(pressure - p.relief_pressure, 0.0)
 
 
 @compiled

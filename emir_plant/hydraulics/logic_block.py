@@ -2,12 +2,27 @@
 
 from typing import Any
 
+from emir_plant.effects import logic_block_fault
 from emir_plant.jit import compiled
+
+
+@compiled
+def pilot_pressure(pressure_lifting: float, pressure_lowering: float, p: Any) -> float:
+    """Return the pressure that works on the pilot, Pa, from those of both chambers, Pa."""
+    if p.pilot == 0.0:
+        return logic_block_fault.pilot_pressure(pressure_lifting, pressure_lowering, p)
+    return logic_block_fault.pilot_pressure(pressure_lowering, pressure_lifting, p)
+
+
+@compiled
+def is_piloted(pilot_pressure: float, p: Any) -> bool:
+    """Tell whether the block is told to open by its pilot pressure, Pa."""
+    return pilot_pressure > logic_block_fault.threshold(p)
 
 
 @compiled
 def opening_rate(opening: float, pilot_pressure: float, p: Any) -> float:
     """Return dy4/dt, 1/s: y4 goes to 1 while the pilot pressure, Pa, is above the threshold."""
-    if pilot_pressure > p.threshold:
+    if is_piloted(pilot_pressure, p):
         return (1.0 - opening) / p.time_constant_opening
-    return -opening / p.time_constant_closing
+    return -opening / logic_block_fault.time_constant_closing(p)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from emir_plant.effects import valve_dead_zone_error, valve_null_offset
 from emir_plant.jit import compiled
 
 
@@ -15,8 +16,10 @@ def spool_acceleration(command: float, spool: float, spool_rate: float, p: Any) 
 @compiled
 def opening(spool: float, p: Any) -> float:
     """Return the signed opening o of the metering edges; 0 inside the dead zone, 1 fully open."""
-    beyond = abs(spool) - p.dead_zone
+    edges = valve_null_offset.shifted(spool, p)
+    dead_zone = valve_dead_zone_error.dead_zone(p)
+    beyond = abs(edges) - dead_zone
     if beyond <= 0.0:
         return 0.0
-    share = beyond / (1.0 - p.dead_zone)
-    return share if spool > 0.0 else -share
+    share = beyond / (1.0 - dead_zone)
+    return share if edges > 0.0 else -share

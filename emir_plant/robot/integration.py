@@ -114,7 +114,7 @@ def _oil(x: Array, h: float, commands: Array, motion: Array, t: Tables) -> None:
 
 
 @compiled
-def _stiffen(mass: Array, h: float, ahead: float, motion: Array, t: Tables) -> None:
+def _stiffen(mass: Array, oil: Array, h: float, ahead: float, motion: Array, t: Tables) -> None:
     """Add to the mass matrix, in place, what the midpoint rule takes implicitly.
 
     ahead: time, s, for which the matrix is to serve.
@@ -126,7 +126,8 @@ def _stiffen(mass: Array, h: float, ahead: float, motion: Array, t: Tables) -> N
                 mass[t.cuts[c, i], t.cuts[c, j]] += block[i, j]
     for k in range(ACTUATORS):
         # friction may be steep where a piston stands; an end stop always is
-        damping = actuators.friction_slope(motion[VELOCITY, k], t.drives[k])
+        load = actuators.oil_force(oil, k, t.drives)
+        damping = actuators.friction_slope(motion[VELOCITY, k], load, t.drives[k])
         stiffness = 0.0
         if k > 0 and _meets_stop(motion[STROKE, k], motion[VELOCITY, k] * ahead, t.stops[:, k]):
             damping += t.stops[STOP_DAMPING, k]
@@ -182,7 +183,7 @@ def period(
     """
     motion, change = np.empty((4, ACTUATORS)), np.empty(q.size)
     drive_motion(q, v, t, motion)
-    _stiffen(mass, h, steps * h, motion, t)
+    _stiffen(mass, oil, h, steps * h, motion, t)
     lower = np.ascontiguousarray(np.linalg.cholesky(mass))
     upper = np.ascontiguousarray(lower.T)
     _oil(oil, 0.5 * h, commands, motion, t)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant.core import LOGIC, P_H, P_S, SPOOL
+from emir_plant.hydraulics import logic_block
 from emir_plant.plant import SimulationError
 from emir_plant.robot import actuators, integration
 from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY
@@ -120,7 +121,8 @@ class RobotPlant:
                 )
             own = x[1 + k * EACH : 1 + (k + 1) * EACH]
             own[P_H], own[P_S] = high, other
-            own[LOGIC] = 1.0 if high > p["threshold"] else 0.0
+            pilot = logic_block.pilot_pressure(high, other, p)
+            own[LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
         x[SIZE : SIZE + self.mechanics.size] = held.coordinates
         return x
 

@@ -21,7 +21,7 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             _argument("bag", None, "folder of the recording; must not exist"),
-            _argument("controller", "cascade", "outer controller: the node is <controller>_node"),
+            _argument("controller", "cascade", "outer controller: cascade, pfc, pfc_tip"),
             _argument("namespace", "", "namespace of all nodes and topics"),
             _argument("params", str(parameters), "YAML file with the nodes' parameters"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),

@@ -61,6 +61,16 @@ def test_figures_of_a_known_run() -> None:
     assert found["valve_travel"] == pytest.approx(0.5)
 
 
+def test_what_moves_before_the_reference_does_not_count_as_rest() -> None:
+    run = _run(delay=-0.5, bending=0.0)
+    tcp = run["tcp_deflection"]
+    early = np.where(tcp.time > 1.5, -0.18 + 0.01, -0.18)  # it saw the move coming at 2 s
+    signals = run.signals | {"tcp_deflection": _signal("tcp_deflection", "m", tcp.time, early)}
+    found = {m.name: m.value for m in metrics(Recording(signals, 0))}
+    assert found["tcp_deflection_static"] == pytest.approx(-0.18, abs=1e-12)
+    assert found["tcp_deflection_up"] == pytest.approx(0.01)
+
+
 def test_a_machine_without_truth_gets_the_figures_that_its_sensors_allow() -> None:
     whole = _run(0.4, 0.05)
     hidden = ("true", "tcp")

@@ -10,7 +10,12 @@ from emir_control.force_loop import (
     ForceLoopInputs,
     ForceLoopParameters,
 )
-from emir_control.prefilter import PrefilterParameters, piston_velocity, valve_command
+from emir_control.prefilter import (
+    PrefilterParameters,
+    joint_angle,
+    piston_velocity,
+    valve_command,
+)
 from emir_plant import linkage
 from emir_plant.core import Truth
 from emir_plant.plant import Plant
@@ -89,6 +94,13 @@ def test_joint_rate_is_turned_into_piston_velocity_by_the_linkage() -> None:
         assert piston_velocity(0.1, angle, FILTER) == pytest.approx(
             0.1 * linkage.lever_arm(angle, p), rel=1e-12
         )
+
+
+def test_joint_angle_is_the_linkages_own() -> None:
+    p = Plant(joint1()).record[0]
+    for angle in np.radians([-10.0, 0.0, 45.0, 85.0]):
+        assert joint_angle(linkage.stroke(angle, p), FILTER) == pytest.approx(angle, abs=1e-12)
+    assert math.isnan(joint_angle(5.0, FILTER))  # longer than the triangle's sides
 
 
 def test_controllers_picture_of_the_machine_is_the_machines_own() -> None:

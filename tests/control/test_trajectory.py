@@ -52,3 +52,15 @@ def test_the_name_gives_the_direction() -> None:
     assert named("hold", p).parameters.distance == 0.0
     with pytest.raises(ParameterError, match="there are lift-lower, lower-lift, hold"):
         named("circle", p)
+
+
+def test_what_is_seen_ahead_is_what_comes() -> None:
+    trajectory = named("lower-lift", TrajectoryParameters(delay=0.5, pause=0.5))
+    state = trajectory.initial(TrajectoryInputs(0.3))
+    seen, came = [], []
+    for _ in range(300):
+        seen.append(trajectory.ahead(state, 20, 0.032))
+        state, reference = trajectory.step(state, TrajectoryInputs(0.3), 0.032)
+        came.append(reference.stroke)
+    for k, strokes in enumerate(seen[:-20]):
+        assert list(strokes) == came[k + 1 : k + 21]

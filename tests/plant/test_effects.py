@@ -1,83 +1,348 @@
-"""What every effect has to satisfy, whichever it is."""
+"""What every effect has to satisfy, whichever it is; then each against its own law."""
 
 import itertools
 import math
+import re
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from emir_common.parameter_tree import with_values
-from emir_plant import core
-from emir_plant.effects import REGISTRY, entrained_air, terms
+from emir_common.quantity import ParameterError, quantities
+from emir_plant import core, linkage
+from emir_plant.core import Truth
+from emir_plant.effects import (
+    REGISTRY,
+    backlash,
+    command_delay,
+    entrained_air,
+    external_load,
+    flow_gain_drift,
+    linkage_error,
+    logic_block_fault,
+    terms,
+    valve_hysteresis,
+)
+from emir_plant.hydraulics import logic_block, valve
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
-from emir_plant.sheet import joint1
+from emir_plant.sensors import measure, readings
+from emir_plant.sheet import joint1, load_sheet
 
 FORTY_FIVE = math.radians(45.0)
+BAR = 1e5
+FRICTION = [name for name in REGISTRY if name.endswith("_friction")]
+LEAKAGE = [name for name in REGISTRY if name.endswith("_leakage")]
+T = {name: k for k, name in enumerate(Truth._fields)}
+
+# A logic block that has to work when the boom is lowered, and a pump that is short of pressure
+# when it is lifted, so that faults of both show.
+MACHINE = with_values(joint1(), {"logic_block.threshold": 100e5, "supply.p0": 130e5})
+PLAIN = Plant(MACHINE)
 
 
 def _switched_on(name: str, factor: float = 1.0) -> Machine:
-    trial = REGISTRY[name].trial
-    size = REGISTRY[name].size
-    values = {f"effects.{name}.{key}": value for key, value in trial.items()}
-    values[f"effects.{name}.{size}"] = factor * trial[size]
-    return with_values(joint1(), values)
+    kind = REGISTRY[name]
+    values = {f"effects.{name}.{key}": value for key, value in kind.trial.items()}
+    for size in kind.sizes:
+        values[f"effects.{name}.{size}"] = factor * kind.trial[size]
+    return with_values(MACHINE, values)
+
+
+def _with(**effects: dict[str, float]) -> Plant:
+    """A plant with effects switched on by name and parameters."""
+    values = {f"effects.{e}.{name}": v for e, about in effects.items() for name, v in about.items()}
+    return Plant(with_values(MACHINE, values))
 
 
 def _moving_state() -> np.ndarray:
-    state = Plant(joint1()).initial(FORTY_FIVE, 30e5)
+    state = PLAIN.initial(FORTY_FIVE, 30e5)
     state[core.MODES + 5] = 30.0  # rate of the rigid mode: the boom is being lifted
     return state
 
 
-@pytest.mark.parametrize("name", REGISTRY)
-def test_effect_is_off_by_default_and_vanishes_with_its_size(name: str) -> None:
-    state, plain = _moving_state(), Plant(joint1())
-    tiny = Plant(_switched_on(name, 1e-9))
-    expected = plain.derivative(state, 0.3)
-    assert getattr(getattr(plain.machine.effects, name), REGISTRY[name].size) == 0.0
-    assert tiny.derivative(state, 0.3) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+def _shown(machine: Machine) -> np.ndarray:
+    """What the sensors show of lifting, rest and lowering: (n, 6)."""
+    plant = Plant(machine)
+    commands = np.zeros(3500)
+    commands[100:1200], commands[1500:3000] = 0.5, -0.6
+    run = plant.simulate(plant.initial(FORTY_FIVE, 30e5), commands, 1e-3)
+    return np.stack(readings(plant, run, 1e-3), axis=1)
+
+
+@pytest.fixture(scope="module")
+def plain_run() -> np.ndarray:
+    return _shown(MACHINE)
+
+
+# what every effect has to satisfy
 
 
 @pytest.mark.parametrize("name", REGISTRY)
-def test_effect_reaches_the_model(name: str) -> None:
+def test_effect_is_off_by_default_and_vanishes_with_its_sizes(
+    name: str, plain_run: np.ndarray
+) -> None:
+    off = getattr(joint1().effects, name)
+    assert all(getattr(off, size) == 0.0 for size in REGISTRY[name].sizes)
     state = _moving_state()
-    plain = Plant(joint1()).derivative(state, 0.3)
-    assert not np.array_equal(Plant(_switched_on(name)).derivative(state, 0.3), plain)
+    tiny = _switched_on(name, 1e-9)
+    expected = PLAIN.derivative(state, 0.3)
+    assert Plant(tiny).derivative(state, 0.3) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    # a lag or a delay of nothing may cost half an integration step
+    span = np.ptp(plain_run, axis=0)
+    assert (np.abs(_shown(tiny) - plain_run).max(axis=0) < 0.01 * span).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [(name, size) for name, kind in REGISTRY.items() for size in kind.sizes]
+)
+def test_each_size_alone_reaches_what_the_sensors_show(
+    name: str, size: str, plain_run: np.ndarray
+) -> None:
+    kind = REGISTRY[name]
+    values = {f"effects.{name}.{key}": v for key, v in kind.trial.items() if key not in kind.sizes}
+    values[f"effects.{name}.{size}"] = kind.trial[size]
+    shown = _shown(with_values(MACHINE, values))
+    assert np.isfinite(shown).all()
+    assert not np.allclose(shown, plain_run, rtol=1e-6, atol=0.0)
 
 
 @pytest.mark.parametrize("name", REGISTRY)
 def test_effect_is_finite_at_rest_and_without_pressure(name: str) -> None:
-    plant = Plant(_switched_on(name, 3.0))
+    plant = Plant(_switched_on(name, 1.5))
     state = plant.initial(FORTY_FIVE, 0.0)
-    state[core.P_H] = 0.0
-    assert np.isfinite(plant.derivative(state, 0.0)).all()
+    for lifting, lowering in ((0.0, 0.0), (20e5, 20e5), (plant.record["pT"][0],) * 2):
+        state[core.P_H], state[core.P_S] = lifting, lowering
+        assert np.isfinite(plant.derivative(state, 0.0)).all()
+        assert np.isfinite(plant.outputs(state)).all()
 
 
 @pytest.mark.parametrize("name", REGISTRY)
 def test_effect_names_its_source_and_starts_a_search_inside_its_range(name: str) -> None:
     kind = REGISTRY[name]
     assert kind.source
-    assert kind.size in kind.trial
+    assert set(kind.sizes) <= kind.trial.keys()
     assert kind.trial.keys() <= {field.name for field in fields(kind)}
     _switched_on(name)  # checks the ranges
+    defaults = {field.name: field.default for field in fields(kind)}
+    start = {key: kind.trial.get(key, defaults[key]) for key in quantities(kind)}
+    assert all(start.values())  # a search scales each parameter by its start
 
 
-@pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction"])
+@pytest.mark.parametrize("name", REGISTRY)
+def test_a_value_out_of_range_is_told_in_one_line(name: str) -> None:
+    for parameter, about in quantities(REGISTRY[name]).items():
+        path = f"effects.{name}.{parameter}"
+        for value in (2.0 * about.high + 1.0, about.low - 1.0, math.nan):
+            with pytest.raises(ParameterError) as error:
+                with_values(joint1(), {path: value})
+            assert str(error.value).startswith(f"{path} = ")
+            assert "outside" in str(error.value)
+            assert "\n" not in str(error.value)
+
+
+def test_an_unknown_effect_is_told_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"^effects.gremlins.size: there is no such parameter"):
+        with_values(joint1(), {"effects.gremlins.size": 1.0})
+    file = tmp_path / "machine.yaml"
+    stated = (Path(core.__file__).parent / "data" / "joint1.yaml").read_text()
+    for text, said in (
+        ("effects: {gremlins: {size: 1.0}}", "effects.gremlins: there is no such effect"),
+        ("effects: {payload: {weight: 1.0}}", "effects.payload.weight: there is no such parameter"),
+        ("effects: {payload: {mass: -1.0}}", r"effects.payload.mass = -1: outside 0 ... 3000 kg"),
+        ("effects: {payload: 100.0}", r"effects.payload = 100.0: not a map"),
+        ("effects: payload", r"effects = 'payload': not a map"),
+    ):
+        file.write_text(f"{stated}\n{text}\n")
+        with pytest.raises(ParameterError, match=rf"^{re.escape(str(file))}: {said}"):
+            load_sheet(file)
+
+
+def test_effects_are_switched_on_by_name_in_a_machine_file(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    stated = (Path(core.__file__).parent / "data" / "joint1.yaml").read_text()
+    file.write_text(
+        f"{stated}\neffects:\n  coulomb_friction: {{force: {{value: 3.0e+3, unit: N}}}}\n"
+    )
+    expected = with_values(joint1(), {"effects.coulomb_friction.force": 3e3})
+    assert load_sheet(file, strict=True).machine == expected
+
+
+def test_every_effect_of_the_sheet_is_in_the_registry(shared: Path) -> None:
+    rows = (shared / "reference" / "effects.md").read_text().splitlines()
+    first_columns = [row.split("|")[1] for row in rows if row.startswith("| `")]
+    named = {name for column in first_columns for name in re.findall(r"`(\w+)`", column)}
+    assert len(named) > 20
+    assert named == REGISTRY.keys()
+
+
+def test_every_effect_has_its_page() -> None:
+    pages = Path(__file__).parents[2] / "docs" / "effects"
+    assert {page.stem for page in pages.glob("*.md")} == REGISTRY.keys()
+    for name in REGISTRY:
+        text = (pages / f"{name}.md").read_text()
+        assert text.startswith(f"# {name}\n")
+        assert "- Balance: " in text
+
+
+# energy
+
+
+@pytest.mark.parametrize("name", FRICTION)
 def test_friction_never_feeds_energy_in(name: str) -> None:
     p = Plant(_switched_on(name)).record[0]
-    for velocity in np.linspace(-0.1, 0.1, 201):
-        assert terms.friction(velocity, p) * velocity >= 0.0
-    assert terms.friction(0.0, p) == 0.0
+    for velocity, load in itertools.product(np.linspace(-0.1, 0.1, 201), (-5e5, 0.0, 6e5)):
+        assert terms.friction(velocity, load, p) * velocity >= 0.0
+        assert terms.friction(0.0, load, p) == 0.0
+
+
+@pytest.mark.parametrize("name", LEAKAGE)
+def test_leakage_never_feeds_energy_in(name: str) -> None:
+    p = Plant(_switched_on(name)).record[0]
+    tank = p["pT"]
+    for lifting, lowering in itertools.product(np.linspace(0.0, 300e5, 31), repeat=2):
+        from_lifting, from_lowering = terms.leakage(lifting, lowering, p)
+        lost = from_lifting * (lifting - tank) + from_lowering * (lowering - tank)
+        assert lost >= 0.0
+
+
+def test_backlash_takes_energy_on_every_closed_path() -> None:
+    """Work of the oil on the play over a period, however fast the force swings."""
+    p = _with(backlash={"gap": 1e-3}).record[0]
+    for period in (0.02, 0.1, 1.0):
+        dt = period / 2000
+        force = 1e5 * np.sin(2.0 * math.pi * np.arange(6000) * dt / period)
+        offset, work = 0.0, 0.0
+        for k, f in enumerate(force):
+            rate = backlash.rate(offset, f, p)
+            offset += dt * rate
+            work += dt * f * rate * (k >= 2000)  # the first period settles
+        assert work > 0.0
+
+
+@pytest.mark.parametrize("name", ["viscous_friction", "pressure_dependent_friction", *LEAKAGE])
+def test_dissipation_damps_the_slow_mode(name: str) -> None:
+    """A boom let go from beside its rest swings less than without the effect."""
+
+    def swing(plant: Plant) -> float:
+        state = plant.initial(FORTY_FIVE, 60e5)
+        state[core.P_H] *= 1.05
+        velocity = plant.simulate(state, np.zeros(6000), 1e-3, 10)[:, T["velocity"]]
+        return float(np.ptp(velocity[-200:]))
+
+    assert swing(Plant(_switched_on(name, 3.0))) < 0.98 * swing(PLAIN)
+
+
+# force
 
 
 def test_sliding_friction_is_the_stated_force_and_breakaway_is_higher() -> None:
-    coulomb = Plant(_switched_on("coulomb_friction")).record[0]
-    assert terms.friction(0.1, coulomb) == pytest.approx(3e3)
+    coulomb = _with(coulomb_friction={"force": 3e3}).record[0]
+    assert terms.friction(0.1, 0.0, coulomb) == pytest.approx(3e3)
     stribeck = Plant(_switched_on("stribeck_friction")).record[0]
-    assert terms.friction(0.1, stribeck) == pytest.approx(3e3, rel=1e-3)
-    assert max(terms.friction(v, stribeck) for v in np.linspace(0, 0.02, 100)) > 1.2 * 3e3
+    assert terms.friction(0.1, 0.0, stribeck) == pytest.approx(3e3, rel=1e-3)
+    assert max(terms.friction(v, 0.0, stribeck) for v in np.linspace(0, 0.02, 100)) > 1.2 * 3e3
+
+
+def test_viscous_friction_is_proportional_to_the_speed() -> None:
+    p = _with(viscous_friction={"coefficient": 1e5}).record[0]
+    assert terms.friction(0.025, 6e5, p) == pytest.approx(2.5e3)
+    assert terms.friction(-0.05, 6e5, p) == pytest.approx(-5e3)
+
+
+def test_pressure_dependent_friction_is_a_share_of_the_load_and_smooth_at_rest() -> None:
+    p = _with(pressure_dependent_friction={"coefficient": 0.02}).record[0]
+    for load in (6e5, -6e5):
+        assert terms.friction(0.05, load, p) == pytest.approx(0.02 * 6e5)
+        assert terms.friction(-0.05, load, p) == pytest.approx(-0.02 * 6e5)
+    slope = 0.02 * 6e5 / p["pressure_dependent_friction_smoothing_speed"]
+    assert terms.friction(1e-6, 6e5, p) == pytest.approx(1e-6 * slope, rel=1e-5)
+
+
+def test_payload_is_felt_as_weight_and_inertia() -> None:
+    plain, loaded = Plant(joint1()), Plant(_switched_on("payload"))
+    extra = (
+        loaded.outputs(loaded.initial(FORTY_FIVE)).force
+        - plain.outputs(plain.initial(FORTY_FIVE)).force
+    )
+    moment = 100.0 * 9.81 * 22.5 * math.cos(FORTY_FIVE)
+    assert extra * linkage.lever_arm(FORTY_FIVE, plain.record[0]) == pytest.approx(moment)
+
+
+def test_a_constant_load_is_carried_by_the_piston_and_bends_the_boom() -> None:
+    """Statics by hand: F L = dF_piston r; the boom bends as one clamped at the joint."""
+    loaded = _with(external_load={"force": -2e3})
+    rest = loaded.initial(FORTY_FIVE, 20e5)
+    rate = np.delete(loaded.derivative(rest, 0.0), core.TIME)
+    assert np.abs(rate).max() < 1e-5
+    before, after = PLAIN.outputs(PLAIN.initial(FORTY_FIVE, 20e5)), loaded.outputs(rest)
+    arm = linkage.lever_arm(FORTY_FIVE, PLAIN.record[0])
+    assert (after.force - before.force) * arm == pytest.approx(2e3 * 22.5)
+    g = MACHINE.geometry
+    springs = g.arms * (g.sections_per_arm - 1)
+    bending_stiffness = g.section_spring * g.boom_length / springs
+    cantilever = -2e3 * g.boom_length**3 / (3.0 * bending_stiffness)
+    assert after.tcp_deflection - before.tcp_deflection == pytest.approx(cantilever, rel=0.05)
+
+
+def test_a_load_acts_from_its_start_for_its_duration() -> None:
+    pulse = _with(external_load={"force": 1e3, "start": 2.0, "duration": 0.5}).record[0]
+    assert [external_load.force(t, pulse) for t in (1.99, 2.0, 2.49, 2.5)] == [0.0, 1e3, 1e3, 0.0]
+    swing = _with(external_load={"force": 1e3, "frequency": 0.5, "start": 1.0}).record[0]
+    values = [external_load.force(1.0 + t, swing) for t in (0.0, 0.5, 1.0, 2.0)]
+    assert values == pytest.approx([1e3, 0.0, -1e3, 1e3], abs=1e-9)
+
+
+# kinematics
+
+
+def test_linkage_error_is_the_stated_one_and_keeps_the_power() -> None:
+    p = _with(linkage_error={"scale": 0.01, "slope": 0.05}).record[0]
+    for angle in np.radians(np.linspace(-10, 90, 21)):
+        stated, h = linkage.lever_arm(angle, p), linkage.stroke(angle, p)
+        arm = linkage_error.lever_arm(angle, p)
+        assert arm == pytest.approx(stated * (1.01 + 0.05 * h), rel=1e-12)
+        step = 1e-5
+        slope = linkage_error.stroke(angle + step, p) - linkage_error.stroke(angle - step, p)
+        assert arm == pytest.approx(slope / (2 * step), rel=1e-8)
+    assert linkage_error.stroke(0.0, p) == 0.0
+
+
+def test_the_measured_stroke_is_that_of_the_stated_linkage() -> None:
+    plant = _with(linkage_error={"scale": 0.05})
+    truth = plant.outputs(plant.initial(FORTY_FIVE, 20e5))
+    assert truth.stroke == pytest.approx(1.05 * linkage.stroke(FORTY_FIVE, plant.record[0]))
+    step = 2.0 * math.pi / 4096 * truth.stroke
+    assert measure(plant, truth, 0).stroke == pytest.approx(truth.stroke / 1.05, abs=step)
+
+
+def test_play_shifts_the_piston_by_the_gap_when_the_force_changes_sign() -> None:
+    gap = 2e-3
+    p = _with(backlash={"gap": gap}).record[0]
+    assert backlash.flank(6e5, p) == pytest.approx(gap / 2)
+    assert backlash.flank(-6e5, p) == pytest.approx(-gap / 2)
+    plant = _with(backlash={"gap": gap})
+    over = [plant.initial(math.radians(a), 120e5) for a in (80.0, 100.0)]
+    forces = [plant.outputs(x).force for x in over]
+    assert forces[0] > 0.0 > forces[1]
+    shift = [plant.outputs(x).stroke - linkage.stroke(plant.outputs(x).angle, p) for x in over]
+    assert shift[0] - shift[1] == pytest.approx(gap, rel=1e-3)
+
+
+def test_crossing_the_play_is_followed_by_the_integration() -> None:
+    """Upright the boom swings from flank to flank; a fourth of the step changes little."""
+    plant = _with(backlash={"gap": 2e-3})
+    state = plant.initial(math.radians(90.0), 120e5)
+    state[core.MODES + 5] = 5.0  # rate of the rigid mode
+    runs = [plant.simulate(state, np.zeros(4000 * n), 1e-3 / n, 10 * n) for n in (1, 4)]
+    force = runs[1][:, T["force"]]
+    assert force.min() < -2e4 < 2e4 < force.max()
+    assert np.abs(runs[0] - runs[1])[:, T["force"]].max() < 2e-3 * np.ptp(force)
+
+
+# chambers
 
 
 def test_leakage_flows_downhill_and_keeps_the_oil() -> None:
@@ -97,6 +362,16 @@ def test_leakage_lets_the_boom_sink() -> None:
     assert run[-1, 2] < run[0, 2] - 1e-3
 
 
+def test_external_leakage_empties_its_own_chamber_alone() -> None:
+    plant = _with(external_leakage={"lowering": 2e-12})
+    state = plant.initial(FORTY_FIVE, 50e5)
+    rate = plant.derivative(state, 0.0)
+    c, h = plant.machine.cylinder, plant.outputs(state).stroke
+    flow = -rate[core.P_S] * (c.volume_lowering_0 - c.area_lowering * h) / c.beta
+    assert flow == pytest.approx(2e-12 * (50e5 - plant.machine.supply.pT))
+    assert rate[core.P_H] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_air_softens_at_low_pressure_and_is_gone_at_high() -> None:
     oil = Plant(_switched_on("entrained_air")).record[0]
     soft = [entrained_air.stiffness(p, oil) for p in np.geomspace(1e5, 1e9, 30)]
@@ -108,13 +383,239 @@ def test_air_softens_at_low_pressure_and_is_gone_at_high() -> None:
     assert soft[0] == pytest.approx(series, rel=1e-9)
 
 
-def test_payload_is_felt_as_weight_and_inertia() -> None:
-    plain, loaded = Plant(joint1()), Plant(_switched_on("payload"))
-    extra = (
-        loaded.outputs(loaded.initial(FORTY_FIVE)).force
-        - plain.outputs(plain.initial(FORTY_FIVE)).force
-    )
-    from emir_plant import linkage
+def test_a_hose_is_a_spring_in_series_with_the_oil() -> None:
+    """1/K = 1/K_stated + V_h / (V K_hose), for 10 l of hose at 0.7e9 Pa."""
+    compliance, volume = 0.010 / 0.7e9, 0.05
+    p = _with(vessel_compliance={"lifting": compliance}).record[0]
+    found = terms.stiffness(100e5, volume, compliance, p)
+    assert 1.0 / found == pytest.approx(1.0 / p["beta"] + 0.010 / (volume * 0.7e9))
+    assert terms.stiffness(10e5, volume, compliance, p) == found  # whatever the pressure
 
-    moment = 100.0 * 9.81 * 22.5 * math.cos(FORTY_FIVE)
-    assert extra * linkage.lever_arm(FORTY_FIVE, plain.record[0]) == pytest.approx(moment)
+
+# supply and valve
+
+
+def test_supply_droops_by_r_q_once_the_lag_is_over() -> None:
+    resistance = 1e9
+    droop = {"supply.p0": 320e5, "effects.supply_pressure_droop.resistance": resistance}
+    plant = Plant(with_values(joint1(), droop))
+    state = plant.initial(math.radians(30.0), 20e5)
+    for _ in range(200):
+        state, truth = plant.step(state, 0.55, 1e-2)
+    assert state[core.DROOP] == pytest.approx(resistance * truth.flow_lifting, rel=0.02)
+    assert state[core.DROOP] == pytest.approx(resistance * 0.5 / 300.0, rel=0.05)
+    assert PLAIN.step(PLAIN.initial(FORTY_FIVE), 0.55, 1.0)[0][core.DROOP] == 0.0
+
+
+def test_a_drooping_supply_is_felt_only_where_pressure_is_short() -> None:
+    def speed(plant: Plant) -> float:
+        run = plant.simulate(plant.initial(math.radians(20.0), 20e5), np.full(3000, 0.9), 1e-3, 10)
+        return float(run[-1, T["stroke"]] - run[0, T["stroke"]])
+
+    def slowed(values: dict[str, float]) -> float:
+        machine = with_values(joint1(), values)
+        droops = with_values(machine, {"effects.supply_pressure_droop.resistance": 1e9})
+        return speed(Plant(droops)) / speed(Plant(machine))
+
+    assert slowed({"supply.p0": 320e5}) == pytest.approx(1.0, abs=1e-3)
+    assert slowed({"supply.p0": 160e5}) < 0.95
+
+
+def test_null_offset_and_dead_zone_move_where_the_valve_opens() -> None:
+    offset = _with(valve_null_offset={"offset": 0.03}).record[0]
+    assert valve.opening(0.07, offset) == pytest.approx(0.0, abs=1e-12)
+    assert valve.opening(0.08, offset) > 0.0
+    assert valve.opening(-0.13, offset) == pytest.approx(0.0, abs=1e-12)
+    assert valve.opening(-0.14, offset) < 0.0
+    wide = _with(valve_dead_zone_error={"error": 0.05}).record[0]
+    assert valve.opening(0.15, wide) == pytest.approx(0.0, abs=1e-12)
+    assert valve.opening(0.16, wide) == -valve.opening(-0.16, wide) > 0.0
+    assert valve.opening(1.0, wide) == 1.0
+    none = _with(valve_dead_zone_error={"error": -0.5}).record[0]
+    assert valve.opening(0.01, none) == pytest.approx(0.01)
+
+
+def test_gain_asymmetry_scales_the_flow_of_one_direction() -> None:
+    plant = _with(valve_gain_asymmetry={"lowering": 0.1})
+    flows = []
+    for machine, command in itertools.product((PLAIN, plant), (0.5, -0.5)):
+        state = machine.initial(FORTY_FIVE, 20e5)
+        state[core.SPOOL] = command
+        truth = machine.outputs(state)
+        flows.append(truth.flow_lifting if command > 0.0 else truth.flow_lowering)
+    assert flows[2] == flows[0]
+    assert flows[3] == pytest.approx(1.1 * flows[1])
+
+
+def test_hysteresis_is_a_play_of_its_width() -> None:
+    """The spool swings slowly: the edges follow it at half the width, and rest on reversal."""
+    width, dt = 0.04, 1e-3
+    p = _with(valve_hysteresis={"width": width}).record[0]
+    spool = 0.5 * np.sin(2.0 * math.pi * 0.1 * np.arange(20000) * dt)
+    memory, play, found, exact = 0.0, 0.0, [], []
+    for y in spool:
+        found.append(valve_hysteresis.edges(y, memory, p))
+        memory += dt * valve_hysteresis.rate(y, memory, p)
+        play = min(max(play, y - width / 2), y + width / 2)
+        exact.append(play)
+    assert np.abs(np.array(found) - exact).max() < 2e-3 * width
+    difference = spool - np.array(found)
+    assert np.ptp(difference) == pytest.approx(width)
+
+
+def test_hysteresis_gives_two_speeds_for_one_command() -> None:
+    """Reached from below, the opening is less by the width than from above."""
+    width = 0.04
+    values = {"effects.valve_hysteresis.width": width, "valve.damping": 1.0}  # no overshoot
+    plant = Plant(with_values(joint1(), values))
+
+    def flow(commands: tuple[float, ...]) -> float:
+        state = plant.initial(FORTY_FIVE, 20e5)
+        for command in commands:
+            state, truth = plant.step(state, command, 0.3)
+        return truth.flow_lifting
+
+    full = MACHINE.valve.flow_nominal
+    difference = flow((0.8, 0.5)) - flow((0.2, 0.5))
+    assert difference == pytest.approx(full * width / 0.9, rel=0.02)
+
+
+@pytest.mark.parametrize("delay", [0.0004, 0.02, 0.0313, 0.15])
+def test_delay_shifts_the_whole_answer(delay: float) -> None:
+    """Against the same machine without it, under the command shifted by hand."""
+    plant = _with(command_delay={"delay": delay})
+    start = plant.initial(FORTY_FIVE, 20e5)
+    fine, held = 1e-4, 320  # 32 ms
+    commands = np.repeat([0.0, 0.5, -0.4, 0.8, 0.8, 0.0, -0.6, 0.3, 0.2, 0.1] * 3, held)
+    shifted = np.concatenate([np.zeros(round(delay / fine)), commands])[: commands.size]
+    expected = PLAIN.simulate(start, shifted, fine, 10)
+    found = plant.simulate(start, commands[::10], 10 * fine)
+    error = np.abs(found - expected)[:, T["spool"]]
+    # a switch inside an integration step acts as its mean: the spool is off by w^2 jump h^2/8
+    jump, p = np.abs(np.diff(commands)).max(), PLAIN.record[0]
+    assert error.max() < 1.01 * p["natural_frequency"] ** 2 * jump * core.STEP**2 / 8.0
+    assert plant.simulate(start, commands, fine, 10) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_delay_line_keeps_a_command_that_changes_all_the_time() -> None:
+    """A sine in steps of 1 ms, more changes than the line holds, arrives late by the delay."""
+    delay, dt = 0.1, 1e-3
+    p = _with(command_delay={"delay": delay}).record
+    time = np.arange(3000) * dt
+    arrived = command_delay.delayed(np.sin(2.0 * math.pi * time), dt, p)
+    expected = np.where(time < delay, 0.0, np.sin(2.0 * math.pi * (time - delay)))
+    assert np.abs(arrived - expected).max() < 0.03
+    assert abs(np.mean(arrived - expected)) < 1e-3
+
+
+def test_delayed_commands_are_what_the_run_itself_delays() -> None:
+    plant = _with(command_delay={"delay": 0.0237})
+    start = plant.initial(FORTY_FIVE, 20e5)
+    commands = np.repeat(np.random.default_rng(1).uniform(-0.8, 0.8, 40), 32)
+    arrived = command_delay.delayed(commands, 1e-3, plant.record)
+    by_hand = PLAIN.simulate(start, arrived, 1e-3)
+    assert plant.simulate(start, commands, 1e-3) == pytest.approx(by_hand, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 8e-3, 2.5e-3])
+@pytest.mark.parametrize(
+    "name", ["command_delay", "valve_hysteresis", "supply_pressure_droop", "sensor_delay"]
+)
+def test_a_state_carries_all_memory(name: str, dt: float) -> None:
+    """Step by step, from a state that was put away, and in one run: the same bits."""
+    plant = Plant(_switched_on(name))
+    state = plant.initial(FORTY_FIVE, 20e5)
+    commands = np.array([0.4, 0.4, -0.2, 0.0, 0.7, 0.6, 0.5, -0.9] * 4)
+    run = plant.simulate(state, commands, dt)
+    for k, command in enumerate(commands):
+        kept = state.copy()
+        after, shown = plant.step(state, command, dt)
+        assert np.array_equal(state, kept)
+        assert np.array_equal(plant.step(kept, command, dt)[0], after)
+        assert tuple(run[k + 1]) == shown
+        state = after
+
+
+def test_gain_drifts_to_its_end_value() -> None:
+    p = _with(flow_gain_drift={"change": 0.2, "time_constant": 300.0}).record[0]
+    assert flow_gain_drift.gain(0.0, p) == 1.0
+    assert flow_gain_drift.gain(300.0, p) == pytest.approx(1.0 + 0.2 * (1.0 - math.exp(-1.0)))
+    assert flow_gain_drift.gain(1e6, p) == pytest.approx(1.2)
+    assert terms.opening(-0.5, 1e6, p) == pytest.approx(-0.6)
+
+
+# logic block
+
+
+def test_fault_of_the_logic_block_changes_threshold_closing_and_pilot() -> None:
+    p = _with(logic_block_fault={"threshold": 10e5, "closing": 1.0, "pilot": 0.25}).record[0]
+    stated = MACHINE.logic_block
+    assert not logic_block.is_piloted(stated.threshold + 9e5, p)
+    assert logic_block.is_piloted(stated.threshold + 11e5, p)
+    assert logic_block_fault.time_constant_closing(p) == pytest.approx(2.0 * 0.3)
+    assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.6)
+    assert logic_block.pilot_pressure(100e5, 20e5, p) == pytest.approx(80e5)
+
+
+# sensors
+
+
+@pytest.mark.parametrize("signal", REGISTRY["sensor_bias"].sizes)
+def test_gain_and_bias_touch_one_sensor_and_what_is_computed_from_it(signal: str) -> None:
+    bias, gain = REGISTRY["sensor_bias"].trial[signal], 0.1
+    plant = _with(sensor_bias={signal: bias}, sensor_gain={signal: gain})
+    run = PLAIN.simulate(_moving_state(), np.zeros(300), 1e-3, 10)
+    true, shown = readings(PLAIN, run, 1e-2), readings(plant, run, 1e-2)
+    assert getattr(shown, signal) == pytest.approx(1.1 * getattr(true, signal) + bias, rel=1e-12)
+    computed = {"angle": {"stroke"}, "deflection": set()}.get(signal, {"force"})
+    for other in set(true._fields) - computed - {signal}:
+        assert np.array_equal(getattr(shown, other), getattr(true, other))
+    for other in computed:
+        assert not np.allclose(getattr(shown, other), getattr(true, other), rtol=1e-6)
+    c = plant.machine.cylinder
+    force = shown.pressure_lifting * c.area_lifting - shown.pressure_lowering * c.area_lowering
+    assert np.array_equal(shown.force, force)
+
+
+def test_predicted_readings_are_those_measured_but_for_noise_and_quantisation() -> None:
+    """With bias, gain and lag at work, along a run in steps of the sensors' period."""
+    machine = with_values(
+        MACHINE,
+        {
+            "effects.sensor_delay.pressure_lifting": 0.05,
+            "effects.sensor_delay.angle": 0.2,
+            "effects.sensor_delay.deflection": 0.03,
+            "effects.sensor_gain.pressure_lowering": 0.05,
+            "effects.sensor_bias.deflection": 1e-3,
+            "sensors.pressure_noise": 0.0,
+            "sensors.deflection_noise": 0.0,
+            "sensors.resolver_bits": 24,
+        },
+    )
+    plant, dt = Plant(machine), 2e-3
+    state = plant.initial(FORTY_FIVE, 20e5)
+    commands = np.repeat([0.0, 0.5, 0.5, 0.0, -0.6, -0.6, 0.0, 0.2], 250)
+    shown = [measure(plant, plant.outputs(state), 0, state)]
+    for k, command in enumerate(commands):
+        state, truth = plant.step(state, command, dt)
+        shown.append(measure(plant, truth, k + 1, state))
+    run = plant.simulate(plant.initial(FORTY_FIVE, 20e5), commands, dt)
+    predicted = np.stack(readings(plant, run, dt), axis=1)
+    span = np.ptp(predicted, axis=0)
+    assert (np.abs(predicted - np.array(shown)).max(axis=0) < 1e-3 * span).all()
+
+
+def test_a_lag_shows_a_ramp_late_by_its_time() -> None:
+    plant = _with(sensor_delay={"pressure_lifting": 0.05})
+    truth = np.zeros((500, len(Truth._fields)))
+    truth[:, T["pressure_lifting"]] = ramp = np.arange(500) * 1e4
+    shown = readings(plant, truth, 1e-2).pressure_lifting
+    assert shown[0] == ramp[0]
+    assert shown[-1] == pytest.approx(ramp[-1] - 0.05 / 1e-2 * 1e4)
+
+
+def test_measuring_with_a_lagging_sensor_needs_the_state() -> None:
+    plant = _with(sensor_delay={"angle": 0.05})
+    truth = plant.outputs(plant.initial(FORTY_FIVE, 20e5))
+    with pytest.raises(ValueError, match=r"effects.sensor_delay.angle: the plant's state"):
+        measure(plant, truth, 0)

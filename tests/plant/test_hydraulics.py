@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from emir_common.parameter_tree import with_values
-from emir_plant import linkage
+from emir_plant import core, linkage
+from emir_plant.core import Truth
 from emir_plant.hydraulics import logic_block, valve
-from emir_plant.hydraulics.flows import flows, pump_flow
+from emir_plant.hydraulics.flows import Pressures, flows, pump_flow
 from emir_plant.hydraulics.orifice import turbulent_flow
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
@@ -30,7 +31,7 @@ def test_orifice_is_turbulent_far_from_zero_and_smooth_at_zero() -> None:
 def test_both_chambers_are_shut_in_the_dead_zone() -> None:
     for spool in np.linspace(-0.1, 0.1, 21):
         assert valve.opening(spool, P) == 0.0
-    assert flows(0.0, 100 * BAR, 20 * BAR, 1.0, P) == (0.0, 0.0)
+    assert flows(0.0, Pressures(P["p0"], 100 * BAR, 20 * BAR), 1.0, P) == (0.0, 0.0)
     assert valve.opening(1.0, P) == 1.0
     assert valve.opening(-0.55, P) == pytest.approx(-0.5)
 
@@ -41,30 +42,31 @@ def test_flow_is_almost_linear_in_the_current_for_100_to_320_bar(supply: int) ->
     p = Plant(with_values(joint1(), {"supply.p0": supply * BAR})).record[0]
     load = 60 * BAR
     openings = np.linspace(0.05, 1.0, 20)
-    flow = np.array([pump_flow(o, p["flow_nominal"], load, p) for o in openings])
-    straight = openings * pump_flow(0.5, p["flow_nominal"], load, p) / 0.5
+    flow = np.array([pump_flow(o, p["flow_nominal"], p["p0"], load, p) for o in openings])
+    straight = openings * pump_flow(0.5, p["flow_nominal"], p["p0"], load, p) / 0.5
     assert flow == pytest.approx(straight, rel=0.02)
 
 
 def test_pump_delivers_nothing_against_a_higher_pressure() -> None:
     nominal = P["flow_nominal"]
-    assert pump_flow(1.0, nominal, P["p0"], P) == 0.0
-    assert pump_flow(1.0, nominal, P["p0"] + 50 * BAR, P) == 0.0  # check valve
-    falling = [pump_flow(1.0, nominal, p, P) for p in np.linspace(0, 200, 41) * BAR]
+    supply = P["p0"]
+    assert pump_flow(1.0, nominal, supply, supply, P) == 0.0
+    assert pump_flow(1.0, nominal, supply, supply + 50 * BAR, P) == 0.0  # check valve
+    falling = [pump_flow(1.0, nominal, supply, p, P) for p in np.linspace(0, 200, 41) * BAR]
     assert all(a >= b for a, b in itertools.pairwise(falling))
 
 
 def test_return_flow_meets_the_series_of_resistances() -> None:
     """Lowering: the pressure drops over edge, line and block add up to p_H - p_T."""
     opening, logic = -0.4, 0.7
-    flow = -flows(opening, 120 * BAR, 50 * BAR, logic, P)[0]
+    flow = -flows(opening, Pressures(P["p0"], 120 * BAR, 50 * BAR), logic, P)[0]
     resistance = P["k_meter_out_lowering"] / opening**2 + P["k_return_line"]
     resistance += P["k_block_out"] / logic**2
     assert resistance * flow**2 == pytest.approx(120 * BAR - P["pT"], rel=1e-3)
 
 
 def test_closed_logic_block_lets_nothing_out() -> None:
-    out, inflow = flows(-0.5, 120 * BAR, 50 * BAR, 0.0, P)
+    out, inflow = flows(-0.5, Pressures(P["p0"], 120 * BAR, 50 * BAR), 0.0, P)
     assert out == 0.0
     assert inflow > 0.0
 
@@ -90,3 +92,57 @@ def test_lever_arm_is_the_derivative_of_the_stroke() -> None:
         assert linkage.lever_arm(angle, P) == pytest.approx(slope / (2 * step), rel=1e-8)
         assert linkage.angle(linkage.stroke(angle, P), P) == pytest.approx(angle, abs=1e-12)
     assert linkage.stroke(0.0, P) == 0.0
+
+
+def test_logic_block_is_piloted_by_the_chamber_that_is_stated() -> None:
+    assert joint1().logic_block.pilot == 0  # the paper's reading
+    low = Plant(with_values(joint1(), {"logic_block.pilot": 1})).record[0]
+    high, little = 90 * BAR, 10 * BAR
+    assert logic_block.pilot_pressure(high, little, P) == high
+    assert logic_block.pilot_pressure(high, little, low) == little
+    assert logic_block.is_piloted(high, P)
+    assert not logic_block.is_piloted(little, P)
+
+
+def test_a_block_that_the_lowering_chamber_pilots_waits_for_its_pressure() -> None:
+    plant = Plant(with_values(joint1(), {"logic_block.pilot": 1}))
+    start = plant.initial(math.radians(45.0), 5 * BAR)
+    run = plant.simulate(start, np.full(600, -0.5), 1e-3)
+    flow = -run[:, Truth._fields.index("flow_lifting")]
+    pilot = run[:, Truth._fields.index("pressure_lowering")]
+    moves = int(np.argmax(flow > 0.0))
+    assert flow[0] == 0.0
+    assert pilot[moves] == pytest.approx(P["threshold"], rel=0.05)
+
+
+@pytest.mark.parametrize("chamber", ["pressure_lifting", "pressure_lowering"])
+def test_relief_valve_limits_the_pressure_of_a_chamber(chamber: str) -> None:
+    """Nothing leaves at the relief pressure; above it the flow grows with the excess."""
+    limit = 70 * BAR
+    plant = Plant(with_values(joint1(), {"cylinder.relief_pressure": limit}))
+    state = plant.initial(math.radians(45.0), 20 * BAR)
+    index = core.P_H if chamber == "pressure_lifting" else core.P_S
+    state[index] = limit
+    below = plant.derivative(state, 0.0)[index]
+    state[index] = limit + 10 * BAR
+    above = plant.derivative(state, 0.0)[index]
+    c, h = plant.machine.cylinder, plant.outputs(state).stroke
+    volume = {
+        core.P_H: c.volume_lifting_0 + c.area_lifting * h,
+        core.P_S: c.volume_lowering_0 - c.area_lowering * h,
+    }[index]
+    assert below == pytest.approx(0.0, abs=1e-6)
+    assert above == pytest.approx(-c.relief_slope * 10 * BAR * c.beta / volume)
+
+
+def test_a_machine_whose_sheet_says_nothing_of_relief_valves_has_none() -> None:
+    from dataclasses import fields
+
+    from emir_plant.hydraulics import chambers
+    from emir_plant.parameters import Cylinder, LogicBlock
+
+    neutral = {f.name: f.default for f in (*fields(Cylinder), *fields(LogicBlock))}
+    values = {f"cylinder.{n}": neutral[n] for n in ("relief_pressure", "relief_slope")}
+    p = Plant(with_values(joint1(), values)).record[0]
+    assert chambers.relief_flow(2000 * BAR, p) == 0.0
+    assert neutral["pilot"] == 0

@@ -25,7 +25,8 @@ def test_initial_state_is_at_rest() -> None:
         state = PLANT.initial(math.radians(degrees), 20e5)
         rate = PLANT.derivative(state, 0.0)
         assert np.abs(rate[core.MODES :]).max() < 1e-9
-        assert np.abs(rate[: core.MODES]).max() < 1e-6
+        assert rate[core.TIME] == 1.0
+        assert np.abs(np.delete(rate[: core.MODES], core.TIME)).max() < 1e-6
 
 
 def test_coupled_mode_is_the_papers_0_7_hz_linearized() -> None:
@@ -164,3 +165,17 @@ def test_what_cannot_be_simulated_is_said_in_one_line() -> None:
         heavy.initial(0.0)
     with pytest.raises(ParameterError, match=r"valve.dead_zone = 2: outside 0 ... 0.5"):
         with_values(joint1(), {"valve.dead_zone": 2.0})
+
+
+def test_the_linear_model_has_no_state_of_an_effect_that_is_off() -> None:
+    state = PLANT.initial(FORTY_FIVE, 20e5)
+    modes = 2 * PLANT.record[0]["mode_joint"].size
+    hydraulics = [core.P_H, core.P_S, core.SPOOL, core.SPOOL_RATE, core.LOGIC]
+    own = [*hydraulics, *range(core.MODES, core.MODES + modes)]
+    for command in (0.0, 0.5):
+        assert linearize(PLANT, state, command).states.tolist() == own
+    droop = {"effects.supply_pressure_droop.resistance": 1e9, "supply.p0": 95e5}
+    drooping = Plant(with_values(joint1(), droop))
+    start = drooping.initial(math.radians(60.0), 20e5)
+    start[core.SPOOL] = 0.9
+    assert core.DROOP in linearize(drooping, start).states

@@ -6,6 +6,9 @@ import pytest
 
 from emir_common.parameter_tree import declared
 from emir_common.quantity import ParameterError
+from emir_plant.effects import Effects
+from emir_plant.hydraulics import chambers
+from emir_plant.plant import Plant
 from emir_plant.sheet import joint1, load_sheet
 
 FILE = Path(__file__).parents[2] / "emir_plant" / "data" / "joint1.yaml"
@@ -62,3 +65,10 @@ def test_the_data_sheet_is_read_with_its_tolerances(shared: Path) -> None:
     assert sheet.tolerances["geometry.modal_frequency"] == 0.02
     assert sheet.machine.sensors.resolver_bits == 12
     assert sheet.machine.geometry.modal_frequency == 1.0
+
+
+def test_what_the_data_sheet_does_not_mention_is_not_there(shared: Path) -> None:
+    sheet = load_sheet(shared / "recordings" / "datasheet.yaml")
+    assert sheet.machine.effects == Effects()
+    assert sheet.machine.logic_block.pilot == 0  # "threshold ... on p_H"
+    assert chambers.relief_flow(1e8, Plant(sheet.machine).record[0]) == 0.0

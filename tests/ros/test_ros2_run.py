@@ -18,10 +18,18 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
 PACKAGE = "emir_ros"
-NODES = ("cascade_node", "force_loop_node", "plant_node", "recorder_node", "trajectory_node")
+NODES = (
+    "cascade_node",
+    "force_loop_node",
+    "pfc_node",
+    "pfc_tip_node",
+    "plant_node",
+    "recorder_node",
+    "trajectory_node",
+)
 DEADLINE = 120.0  # s; the machine's first start compiles it
 
-PUBLISHED = {name: {t.name for t in TOPICS if t.publisher == name} for name in NODES}
+PUBLISHED = {name: {t.name for t in TOPICS if name in t.publishers} for name in NODES}
 SUBSCRIBED = {"plant_node": {VALVE_COMMAND.name}, "recorder_node": {t.name for t in TOPICS}}
 
 

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir_ros[robot]'")
 
 from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY, flows_of
 from emir_plant.robot.parameters import Pump, Robot
@@ -164,6 +165,17 @@ def test_one_pump_feeds_all_and_droops() -> None:
     assert low < 300e5 - pump.droop
     short = shared / wanted
     assert short[2] < short[5]  # the heavily loaded joint 2 goes short before joint 5
+
+
+def test_effects_act_on_joint_1_and_others_are_refused() -> None:
+    sticky = with_values(ROBOT, {"main.effects.coulomb_friction.force": 2e4})
+    x, y = PLANT.initial(BENT, 20e5), RobotPlant(sticky).initial(BENT, 20e5)
+    x, y = PLANT.advance(x, MOVING, 0.5), RobotPlant(sticky).advance(y, MOVING, 0.5)
+    more = y[1 + EACH] - x[1 + EACH]  # p_H of joint 1; the friction is 3.2 bar
+    assert 0.0 < more < 2.0 * 2e4 / ROBOT.main.cylinder.area_lifting
+    late = with_values(ROBOT, {"main.effects.command_delay.delay": 0.01})
+    with pytest.raises(ParameterError, match=r"effects.command_delay: not in the model"):
+        RobotPlant(late).initial(BENT)
 
 
 def test_end_stop_holds_the_piston() -> None:

@@ -1,0 +1,214 @@
+"""From the machine to a predictive controller: linearize, reduce, design, check stability."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import root
+
+from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError, check_ranges, quantity
+from emir_control import design
+from emir_control.force_loop import ForceLoopParameters
+from emir_control.internal_model import InternalModel
+from emir_control.pfc import Pfc, PfcParameters
+from emir_control.pfc_file import STROKE, TIP_ANGLE
+from emir_control.prefilter import valve_command
+from emir_msgs_py.topics import CONTROL_PERIOD_NS
+from emir_plant import core, linkage
+from emir_plant.linearize import linearize
+from emir_plant.parameters import Machine
+from emir_plant.plant import Plant, SimulationError
+
+Array = NDArray[np.float64]
+
+PERIOD = CONTROL_PERIOD_NS * 1e-9
+BAR = 1e5
+DAMPED = ForceLoopParameters()
+OUTPUTS = {"pfc": STROKE, "pfc_tip": TIP_ANGLE}  # by controller
+ORDERS = {STROKE: 6, TIP_ANGLE: 8}  # paper 3.3
+RESOLVER_STEP = {STROKE: 1e-3, TIP_ANGLE: 1.5e-3}  # m, rad: 12 bits of a turn
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """Where the machine is linearized: in slow steady motion.
+
+    At rest the valve is in its dead zone and no command would move anything.
+    """
+
+    angle: float = quantity("rad", -0.5, 1.6, "boom angle", default=math.pi / 4)
+    payload: float = quantity("kg", 0.0, 3000.0, "at the TCP", default=0.0)
+    velocity: float = quantity("m/s", -0.2, 0.2, "of the piston, not 0", default=0.01)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if self.velocity == 0.0:
+            raise ParameterError("velocity = 0 m/s: the machine has to move")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignTask:
+    """What is wanted. order: of the internal model, before an observer's one more state.
+
+    observer: standard deviation of the unknown input's change from sample to sample, m/s; 0:
+    an independent model. tuning: other fields of PfcParameters.
+    """
+
+    controller: str = "pfc"
+    order: int = 6
+    point: OperatingPoint = field(default_factory=OperatingPoint)
+    observer: float = 0.0
+    tuning: dict[str, object] = field(default_factory=dict)
+
+
+def steady_motion(plant: Plant, point: OperatingPoint) -> tuple[Array, float]:
+    """Return state and valve command of a steady motion through a point.
+
+    Raises SimulationError where the machine has no such motion.
+    """
+    p = plant.record[0]
+    rate = point.velocity / linkage.lever_arm(point.angle, p) / p["mode_joint"][0]
+
+    def state(pressure: float, opening: float) -> Array:
+        x = plant.initial(point.angle, pressure * BAR)
+        x[core.SPOOL], x[core.LOGIC] = opening, 1.0
+        x[core.MODES + p["mode_joint"].size] = rate  # the boom turns as a whole
+        return x
+
+    def pressure_rates(unknown: Array) -> Array:
+        pressure, opening = unknown
+        return plant.derivative(state(pressure, opening), opening)[[core.P_H, core.P_S]] / BAR
+
+    guess = valve_command(point.velocity, DAMPED.prefilter)
+    found = root(pressure_rates, [30.0, guess])
+    if not found.success or abs(found.x[1]) > 1.0:
+        raise SimulationError(
+            f"no steady motion of {point.velocity * 1e3:g} mm/s at"
+            f" {math.degrees(point.angle):.0f} deg with {point.payload:g} kg"
+        )
+    return state(*found.x), float(found.x[1])
+
+
+def velocity_model(
+    machine: Machine,
+    point: OperatingPoint,
+    output: str,
+    force_loop: ForceLoopParameters = DAMPED,
+) -> InternalModel:
+    """Return the sampled model from velocity command to `stroke`, m, or `tip_angle`, rad.
+
+    The machine about the point, valve held over a control period, the force loop closed. Raises
+    SimulationError as `steady_motion`.
+    """
+    plant = Plant(with_values(machine, {"geometry.payload": point.payload}))
+    state, command = steady_motion(plant, point)
+    linear = linearize(plant, state, command)
+    rows = dict(zip(core.Truth._fields, linear.C, strict=True))
+    n = len(linear.A)
+    held = expm(PERIOD * np.block([[linear.A, linear.B], [np.zeros((1, n + 1))]]))
+    valve = InternalModel(held[:n, :n], held[:n, n], rows[output], PERIOD)
+    ends = 0.99 * point.velocity, 1.01 * point.velocity
+    low, high = (valve_command(v, force_loop.prefilter) for v in ends)
+    return design.with_force_loop(
+        valve, rows["force"], (high - low) / (ends[1] - ends[0]), force_loop
+    )
+
+
+def design_pfc(machine: Machine, task: DesignTask) -> PfcParameters:
+    """Return the controller's parameters: the machine's model, reduced, and the tuning.
+
+    Raises SimulationError or ParameterError for a task that cannot be met.
+    """
+    output = OUTPUTS[task.controller]
+    model = design.reduced(velocity_model(machine, task.point, output), task.order)
+    if task.observer > 0.0:
+        noise = design.Noise(task.observer, RESOLVER_STEP[output] / math.sqrt(12.0))
+        model = design.with_observer(model, noise)
+    return PfcParameters(model=model, **task.tuning)  # type: ignore[arg-type] # checked there
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """Spectral radius of the closed loop; stable below 1.
+
+    angles: (a,) rad. payloads: (p,) kg. radius: {piston velocity, m/s: (p, a)}; NaN where the
+    machine has no such motion.
+    """
+
+    angles: Sequence[float]
+    payloads: Sequence[float]
+    radius: dict[float, Array]
+
+    @property
+    def worst(self) -> float:
+        """Return the largest radius."""
+        return float(np.nanmax(list(self.radius.values())))
+
+
+ANGLES = tuple(math.radians(degrees) for degrees in (30.0, 45.0, 60.0, 75.0))
+PAYLOADS = (0.0, 500.0, 1000.0, 1500.0)
+VELOCITIES = (0.01, -0.01)  # lifting and lowering
+
+
+def stability_map(machine: Machine, controller: str, parameters: PfcParameters) -> StabilityMap:
+    """Return the closed loop's stability over posture, payload and direction."""
+    law = Pfc(parameters)
+
+    def radius(angle: float, payload: float, velocity: float) -> float:
+        point = OperatingPoint(angle=angle, payload=payload, velocity=velocity)
+        try:
+            model = velocity_model(machine, point, OUTPUTS[controller])
+        except SimulationError:
+            return math.nan
+        return design.spectral_radius(law, model)
+
+    tables = {
+        v: np.array([[radius(angle, load, v) for angle in ANGLES] for load in PAYLOADS])
+        for v in VELOCITIES
+    }
+    return StabilityMap(ANGLES, PAYLOADS, tables)
+
+
+def as_text(found: StabilityMap) -> str:
+    """Return the map as text."""
+    lines = []
+    for velocity, table in found.radius.items():
+        lines.append(
+            f"  {'lifting' if velocity > 0.0 else 'lowering'}, {abs(velocity) * 1e3:g} mm/s"
+        )
+        degrees = "".join(f"{math.degrees(angle):7.0f} deg" for angle in found.angles)
+        lines.append(f"  {'payload':>10}{degrees}")
+        for payload, row in zip(found.payloads, table, strict=True):
+            cells = "".join(_cell(value) for value in row)
+            lines.append(f"  {payload:7.0f} kg{cells}")
+    return "\n".join(lines)
+
+
+def _cell(radius: float) -> str:
+    if math.isnan(radius):
+        return f"{'-':>11}"
+    return f"{radius:10.4f}{' ' if radius < 1.0 else '!'}"
+
+
+def picture(found: StabilityMap) -> Figure:
+    """Return the map as a picture: blue stable, red not, grey without such a motion."""
+    figure = Figure(figsize=(4.2 * len(found.radius), 3.6), layout="constrained")
+    axes = figure.subplots(1, len(found.radius), squeeze=False)[0]
+    for axis, (velocity, table) in zip(axes, found.radius.items(), strict=True):
+        axis.set_facecolor("0.8")
+        image = axis.imshow(table, cmap="RdBu_r", vmin=0.97, vmax=1.03, origin="lower")
+        axis.set_xticks(range(len(found.angles)), [f"{math.degrees(a):.0f}" for a in found.angles])
+        axis.set_yticks(range(len(found.payloads)), [f"{load:.0f}" for load in found.payloads])
+        axis.set_xlabel("boom angle / deg")
+        axis.set_ylabel("payload / kg")
+        axis.set_title("lifting" if velocity > 0.0 else "lowering")
+        for (row, column), value in np.ndenumerate(table):
+            if not math.isnan(value):
+                axis.text(column, row, f"{value:.4f}", ha="center", va="center", color="k")
+    figure.colorbar(image, ax=list(axes), label="spectral radius")
+    return figure

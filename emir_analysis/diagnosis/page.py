@@ -1,0 +1,152 @@
+"""The report of a diagnosis as a page that is read in two minutes."""
+
+from pathlib import Path
+
+from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.diagnosis.pictures import (
+    SHOWN,
+    balances_picture,
+    free_runs_picture,
+    shape_picture,
+)
+from emir_analysis.diagnosis.result import TOLD, Diagnosis, EffectResult, ParameterResult
+from emir_analysis.diagnosis.select import quiet
+from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
+
+VERDICTS = {
+    "nothing_missing": "Nothing is missing",
+    "found": "Found",
+    "ambiguous": "More than one effect would do",
+    "unexplained": "Something is there that no known effect explains",
+}
+
+
+def write_page(path: Path, findings: Findings, result: Diagnosis, judge: Experiment) -> None:
+    """Write the report as HTML. Raises InputError when the file cannot be written."""
+    blocks: list[Block] = [
+        Text(f"{VERDICTS[result.verdict]}: {result.statement}.", lead=True),
+        *_effects(result.effects),
+        *_free_runs(findings, result, judge),
+        *_balances(findings, result),
+        *_candidates(result),
+        *_parameters(findings, result),
+    ]
+    write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
+
+
+def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
+    rows = [
+        (effect.name, effect.balance, name, p.value, p.low, p.high, p.unit)
+        for effect in effects
+        for name, p in effect.parameters.items()
+    ]
+    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit")
+    caption = "low, high: two standard deviations from the curvature of the fit"
+    return [Table(columns, rows, caption)] if rows else []
+
+
+def _free_runs(findings: Findings, result: Diagnosis, judge: Experiment) -> list[Block]:
+    rows: list[tuple[str | float, ...]] = []
+    for name, s in result.signals.items():
+        m = result.block_medians[name]
+        factor = SHOWN[name][1]
+        ratios = [s.nominal, m.nominal, s.refitted, m.refitted, s.with_effect, m.with_effect]
+        rows.append((SHOWN[name][0], s.noise * factor, *(ratio / s.noise for ratio in ratios)))
+    columns = (
+        "signal",
+        "noise",
+        "data sheet",
+        "(blocks)",
+        "re-fitted",
+        "(blocks)",
+        "with effect",
+        "(blocks)",
+    )
+    return [
+        Heading(f"Free run on {Path(result.judged_on).name}"),
+        Table(
+            columns,
+            rows,
+            "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
+            "of the sensor noise. Up to 1.1 is at the noise, up to 2 explained.",
+        ),
+        Picture(
+            free_runs_picture(findings, judge),
+            "The machine simulated from rest under the recorded valve command alone. "
+            "Right: simulated minus measured, linear up to 5 times the noise.",
+        ),
+    ]
+
+
+def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
+    blocks: list[Block] = [
+        Heading("What each balance lacks"),
+        Table(
+            ("balance", "noise", "data sheet", "re-fitted", "after", "unit"),
+            [
+                (name, b.noise, b.before, b.refitted, b.after, b.unit)
+                for name, b in result.balances.items()
+            ],
+            f"RMS over windows of half a second to a second of {Path(result.recording).name}; "
+            "noise is what the sensors alone would leave.",
+        ),
+        Picture(
+            balances_picture(findings),
+            "Measured signals go into each balance; what does not come out is missing there. "
+            "The band is twice the sensors' noise.",
+        ),
+    ]
+    if not quiet(rms(findings.residuals["refitted"]), findings.floor):
+        figure, name = shape_picture(findings)
+        blocks.append(
+            Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")
+        )
+    shape = result.shape
+    if shape is not None and findings.speaking is not None and shape.share > TOLD:
+        what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
+        blocks.append(
+            Table(
+                (f"{shape.predictor}, {shape.unit}", "lowering", "lifting"),
+                shape.table,
+                f"What is left in the balance {what}, against the signal that predicts it best "
+                f"({100 * shape.share:.0f} % of the variance in parts left out).",
+            )
+        )
+    return blocks
+
+
+def _candidates(result: Diagnosis) -> list[Block]:
+    rows = [
+        (c.name, c.score, "not simulated" if c.free_run is None else f"{c.free_run:.3g}")
+        for c in result.candidates
+    ]
+    return [
+        Heading("What was tried"),
+        Table(
+            ("effects", "balances", "free run"),
+            rows,
+            "How much better than parameters only, on the last third of the recording, which the "
+            "fit had not seen: difference of the Bayesian information criterion, above 10 strong.",
+        ),
+    ]
+
+
+def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
+    stated = {u.path: u for u in findings.refitted.unknowns.members}
+
+    def row(path: str, p: ParameterResult) -> tuple[str | float, ...]:
+        about = stated[path]
+        return (path, about.origin, p.value, p.low, p.high, *about.deviation(0.0, 1.0), p.unit)
+
+    return [
+        Heading("Parameters"),
+        Table(
+            ("parameter", "stated", "fitted", "low", "high", "least", "most", "unit"),
+            [row(path, p) for path, p in result.parameters.items()],
+            "low, high: two standard deviations from the curvature of the fit, the tolerance "
+            "counted as knowledge; least, most: the maker's tolerance. What the recording cannot "
+            "tell stays near its stated value.",
+        ),
+    ]

@@ -1,0 +1,118 @@
+"""The pictures of a diagnosis."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.candidates import LINKAGE
+from emir_analysis.diagnosis.diagnose import Findings, loudest
+from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
+from emir_analysis.diagnosis.free_run import free_run
+from emir_analysis.report import new_figure
+
+MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"
+LOWERING, LIFTING = "#b5460b", "#0b6bb5"
+
+# What a hydraulics engineer reads: label and factor from the SI unit
+SHOWN = {
+    "piston_stroke": ("stroke, mm", 1e3),
+    "pressure_lifting": ("p_H, bar", 1e-5),
+    "pressure_lowering": ("p_S, bar", 1e-5),
+    "tip_deflection_angle": ("tip deflection, mrad", 1e3),
+    "force": ("force, kN", 1e-3),
+    "lifting_chamber": ("flow H, l/min", 6e4),
+    "lowering_chamber": ("flow S, l/min", 6e4),
+    "bending": ("bending, mrad", 1e3),
+}
+
+
+def free_runs_picture(findings: Findings, judge: Experiment) -> Figure:
+    """Show each signal measured and simulated, and the errors beside it."""
+    figure = new_figure(8.0)
+    axes = figure.subplots(4, 2, sharex=True, width_ratios=(3, 2))
+    sensors = noise(findings.sheet.machine)
+    machines = {
+        "data sheet": (findings.sheet.machine, NOMINAL),
+        "re-fitted": (findings.refitted.machine, REFITTED),
+    }
+    if findings.chosen.effects:
+        machines["with effect"] = (findings.chosen.machine, FINAL)
+    runs = {name: (free_run(m, judge), colour) for name, (m, colour) in machines.items()}
+    for row, (signal, beside) in enumerate(axes):
+        label, factor = SHOWN[list(OUTPUTS)[row]]
+        for name, (run, colour) in runs.items():
+            error = (run[:, row] - judge.outputs[:, row]) / sensors[row]
+            signal.plot(judge.time, factor * run[:, row], color=colour, lw=1.0, label=name)
+            beside.plot(judge.time, error, color=colour, lw=0.7)
+        measured = factor * judge.outputs[:, row]
+        signal.plot(judge.time, measured, color=MEASURED, lw=0.8, ls=(0, (3, 2)), label="measured")
+        signal.set_ylabel(label)
+        beside.set_ylabel("error / noise")
+        beside.set_yscale("symlog", linthresh=5.0)
+        _tidy(signal, beside)
+    axes[0, 0].legend(ncols=4, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    axes[-1, 0].set_xlabel("time, s")
+    axes[-1, 1].set_xlabel("time, s")
+    return figure
+
+
+def balances_picture(findings: Findings) -> Figure:
+    """Show what is missing in each balance over time, with the band of the sensors' noise."""
+    figure = new_figure(6.5)
+    shown = [(k, name) for k, name in enumerate(BALANCES) if k != LINKAGE]
+    axes = figure.subplots(len(shown), 1, sharex=True)
+    stages = {"before": ("data sheet", NOMINAL), "refitted": ("re-fitted", REFITTED)}
+    if findings.chosen.effects:
+        stages["after"] = (findings.chosen.name, FINAL)
+    for ax, (k, name) in zip(axes, shown, strict=True):
+        label, factor = SHOWN[name]
+        band = 2.0 * factor * findings.floor[k]
+        ax.axhspan(-band, band, color="#0b6bb5", alpha=0.12, lw=0)
+        for stage, (text, colour) in stages.items():
+            residual = factor * findings.residuals[stage][:, k]
+            ax.plot(findings.balances.time, residual, color=colour, lw=1.0, label=text)
+        ax.set_ylabel(label)
+        _tidy(ax)
+    axes[0].legend(ncols=3, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    axes[-1].set_xlabel("time, s")
+    return figure
+
+
+def shape_picture(findings: Findings) -> tuple[Figure, str]:
+    """Show the loudest balance of the re-fitted machine against what might govern it."""
+    refitted = findings.residuals["refitted"]
+    name = loudest(refitted, findings.floor) or "force"
+    k = list(BALANCES).index(name)
+    label, factor = SHOWN.get(name, (name, 1.0))
+    balances, outputs = findings.balances, findings.experiment.outputs
+    velocity = balances.average(balances.velocity)
+    signals = {
+        "piston velocity, mm/s": 1e3 * velocity,
+        "piston stroke, mm": 1e3 * balances.average(outputs[:, 0]),
+        "p_H, bar": 1e-5 * balances.average(outputs[:, 1]),
+        "p_S, bar": 1e-5 * balances.average(outputs[:, 2]),
+    }
+    figure = new_figure(2.8)
+    axes = figure.subplots(1, len(signals), sharey=True)
+    for ax, (text, values) in zip(axes, signals.items(), strict=True):
+        for moving, colour, where in (
+            ("lowering", LOWERING, velocity < 0.0),
+            ("lifting", LIFTING, velocity >= 0.0),
+        ):
+            ax.plot(
+                values[where], factor * refitted[where, k], ".", ms=3, color=colour, label=moving
+            )
+        ax.set_xlabel(text)
+        _tidy(ax)
+    axes[0].set_ylabel(f"missing {label}")
+    axes[0].legend(fontsize=8, loc="best")
+    return figure, name
+
+
+def _tidy(*axes: Axes) -> None:
+    for ax in axes:
+        ax.grid(color="#dfe4e9", lw=0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=8)
+        ax.xaxis.label.set_fontsize(9)
+        ax.yaxis.label.set_fontsize(9)

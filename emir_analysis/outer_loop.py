@@ -1,0 +1,75 @@
+"""The outer loops of the closed loop without ROS: what each nodes' object is given and gives."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
+from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
+from emir_control.tip import Tip, TipInputs
+from emir_control.trajectory import Reference
+from emir_plant.sensors import Measurement
+
+Signals = dict[str, float]
+
+
+class Situation(NamedTuple):
+    """What an outer loop may know in a control period."""
+
+    reference: Reference
+    preview: tuple[float, ...]  # reference strokes of the next periods, m
+    reading: Measurement
+
+
+class OuterLoop(Protocol):
+    """From a situation to the velocity command and the terms it is made of."""
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+
+
+@dataclass(frozen=True)
+class CascadeLoop:
+    """Conventional control, law (11)."""
+
+    cascade: Cascade = Cascade(CascadeParameters())
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        inputs = CascadeInputs(now.reference, now.reading.stroke)
+        state, outputs = self.cascade.step(state or self.cascade.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
+
+
+@dataclass(frozen=True)
+class PfcLoop:
+    """Predictive control of the stroke, law (12)."""
+
+    pfc: Pfc
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        wanted = now.reference
+        inputs = PfcInputs(wanted.stroke, wanted.velocity, now.preview, now.reading.stroke)
+        state, outputs = self.pfc.step(state or self.pfc.initial(inputs), inputs, dt)
+        return state, pfc_signals("pfc", outputs)
+
+
+@dataclass(frozen=True)
+class PfcTipLoop:
+    """Predictive control of the TCP's angle alpha_6."""
+
+    tip: Tip
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        inputs = TipInputs(now.reference, now.preview, now.reading.angle, now.reading.deflection)
+        state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
+        return state, pfc_signals("pfc_tip", outputs)
+
+
+def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
+    """Return command and terms by the names of the topic table."""
+    terms = outputs._asdict()
+    command = terms.pop("velocity_command")
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"velocity_command": command} | named

@@ -1,0 +1,41 @@
+"""Play between piston and joint: the piston crosses it when the force changes sign."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """Offset s of the piston against the joint, T ds/dt = (gap / 2) tanh(F / F_s) - s.
+
+    F is the oil's force: well above the seating force F_s the piston rests on one flank, well
+    below -F_s on the other, and in between it is on its way.
+    """
+
+    balance: ClassVar[Balance] = "kinematics"
+    sizes: ClassVar[tuple[str, ...]] = ("gap",)
+    source: ClassVar[str] = "worn pins and bushings, 0.1-1 mm"
+    trial: ClassVar[dict[str, float]] = {"gap": 5e-4}
+
+    gap: float = quantity("m", 0.0, 5e-3, "from flank to flank", default=0.0)
+    seating_force: float = quantity("N", 1e4, 1e6, "F_s, at which a flank is met", default=2e4)
+    crossing_time: float = quantity("s", 0.01, 0.5, "T, of the film in the bearing", default=0.01)
+
+
+@compiled
+def flank(force: float, p: Any) -> float:
+    """Return where the piston rests against the joint, m, under a steady force, N."""
+    return 0.5 * p.backlash_gap * math.tanh(force / p.backlash_seating_force)
+
+
+@compiled
+def rate(offset: float, force: float, p: Any) -> float:
+    """Return ds/dt, m/s, of the offset s, m, under the oil's force, N."""
+    if p.backlash_gap == 0.0:
+        return 0.0
+    return (flank(force, p) - offset) / p.backlash_crossing_time

@@ -1,0 +1,32 @@
+"""A valve whose gain changes along the run, as the oil warms up."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class FlowGainDrift(Effect):
+    """Opening times 1 + change [1 - exp(-t / T)], t since the start of the run."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("change",)
+    source: ClassVar[str] = (
+        "viscosity falls as the tank warms up over some minutes; 5-20 % of the flow"
+    )
+    trial: ClassVar[dict[str, float]] = {"change": 0.2}
+
+    change: float = quantity("1", -0.9, 5.0, "relative, of the gain, in the end", default=0.0)
+    time_constant: float = quantity("s", 1.0, 1e5, "T, of warming up", default=300.0)
+
+
+@compiled
+def gain(time: float, p: Any) -> float:
+    """Return the factor on the opening at a time since the start of the run, s."""
+    if p.flow_gain_drift_change == 0.0:
+        return 1.0
+    return 1.0 - p.flow_gain_drift_change * math.expm1(-time / p.flow_gain_drift_time_constant)

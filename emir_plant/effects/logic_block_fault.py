@@ -1,0 +1,46 @@
+"""A safety logic block that does not switch as stated."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class LogicBlockFault(Effect):
+    """Threshold, pilot or closing time off.
+
+    p_threshold + threshold; T_closing (1 + closing); and a pilot pressure mixed with a share of
+    the other chamber's (a leaking pilot line).
+    """
+
+    balance: ClassVar[Balance] = "logic block"
+    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "pilot")
+    source: ClassVar[str] = (
+        "spring setting, a sticking or blocked pilot; magnitudes of a maladjusted valve"
+    )
+    trial: ClassVar[dict[str, float]] = {"threshold": 5e5, "closing": 0.5, "pilot": 0.1}
+
+    threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
+    closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)
+    pilot: float = quantity("1", 0.0, 1.0, "share of the other chamber's pressure", default=0.0)
+
+
+@compiled
+def threshold(p: Any) -> float:
+    """Return the threshold as it is, Pa."""
+    return p.threshold + p.logic_block_fault_threshold
+
+
+@compiled
+def time_constant_closing(p: Any) -> float:
+    """Return the closing time constant as it is, s."""
+    return p.time_constant_closing * (1.0 + p.logic_block_fault_closing)
+
+
+@compiled
+def pilot_pressure(own: float, other: float, p: Any) -> float:
+    """Return the pressure that works on the pilot, Pa, from those of both chambers."""
+    return own + p.logic_block_fault_pilot * (other - own)

@@ -1,0 +1,31 @@
+"""Dry friction that grows with the load on the piston."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class PressureDependentFriction(Effect):
+    """Force against the motion: mu |p_H A_H - p_S A_S| tanh(v / v_0)."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    source: ClassVar[str] = "seal and bearing friction, 1-3 % of the load"
+    trial: ClassVar[dict[str, float]] = {"coefficient": 0.02}
+
+    coefficient: float = quantity("1", 0.0, 0.2, "mu", default=0.0)
+    smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=2e-3)
+
+
+@compiled
+def friction(velocity: float, load: float, p: Any) -> float:
+    """Return the friction force, N, at the piston velocity, m/s, and the oil's force, N."""
+    if p.pressure_dependent_friction_coefficient == 0.0:
+        return 0.0
+    level = p.pressure_dependent_friction_coefficient * abs(load)
+    return level * math.tanh(velocity / p.pressure_dependent_friction_smoothing_speed)

@@ -1,0 +1,32 @@
+"""A supply whose pressure falls when oil is taken from it."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class SupplyPressureDroop(Effect):
+    """Pressure p_0 - D at the pump, T dD/dt = R Q - D, Q the flow the pump delivers."""
+
+    balance: ClassVar[Balance] = "supply"
+    sizes: ClassVar[tuple[str, ...]] = ("resistance",)
+    source: ClassVar[str] = (
+        "pump controller and line: some 10 bar at 200 l/min, recovering in 0.1-0.5 s"
+    )
+    trial: ClassVar[dict[str, float]] = {"resistance": 1e9}
+
+    resistance: float = quantity("Pa s/m^3", 0.0, 1e11, "R", default=0.0)
+    time_constant: float = quantity("s", 5e-3, 10.0, "T", default=0.2)
+
+
+@compiled
+def rate(droop: float, flow: float, p: Any) -> float:
+    """Return dD/dt, Pa/s, of the droop D, Pa, while the pump delivers a flow, m^3/s."""
+    if p.supply_pressure_droop_resistance == 0.0:
+        return 0.0
+    wanted = p.supply_pressure_droop_resistance * flow
+    return (wanted - droop) / p.supply_pressure_droop_time_constant

@@ -1,0 +1,29 @@
+"""A valve that opens further in one direction than in the other."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+from emir_plant.jit import compiled
+
+
+@dataclass(frozen=True)
+class ValveGainAsymmetry(Effect):
+    """Opening times 1 + error, with an error of its own for each direction."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("lifting", "lowering")
+    source: ClassVar[str] = "manufacturing tolerance of the metering edges, 5-10 %"
+    trial: ClassVar[dict[str, float]] = {"lifting": 0.05, "lowering": 0.05}
+
+    lifting: float = quantity("1", -0.9, 2.0, "relative error of the opening, o > 0", default=0.0)
+    lowering: float = quantity("1", -0.9, 2.0, "relative error of the opening, o < 0", default=0.0)
+
+
+@compiled
+def scaled(opening: float, p: Any) -> float:
+    """Return the opening as it is, from the opening as stated."""
+    if opening > 0.0:
+        return opening * (1.0 + p.valve_gain_asymmetry_lifting)
+    return opening * (1.0 + p.valve_gain_asymmetry_lowering)

@@ -1,0 +1,72 @@
+"""The balances of runs that another integrator made: quiet, or loud where the effect is."""
+
+import numpy as np
+import pytest
+import recorded
+
+from emir_analysis.diagnosis.balances import BALANCES, Balances
+from emir_analysis.diagnosis.experiment import experiment
+from emir_analysis.signals import Recording, Signal
+from emir_plant.parameters import Machine
+from emir_plant.sheet import load_sheet
+
+FRICTION = 12e3  # N
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    """The machine of the tests' data sheet."""
+    sheet = tmp_path_factory.mktemp("sheet") / "datasheet.yaml"
+    sheet.write_text(recorded.DATA_SHEET)
+    return load_sheet(sheet).machine
+
+
+def residuals(machine: Machine, friction: recorded.Force | None) -> tuple[Balances, recorded.Array]:
+    """Return the balances of the machine along a run with friction, and what they lack."""
+    commands = recorded.moves(16.0, seed=5)
+    sensors = recorded.measured(machine, recorded.simulate(machine, commands, friction), seed=5)
+    topics = {
+        "joint_angle": "joint_states",
+        "piston_stroke": "cylinder",
+        "pressure_lifting": "pressure_lifting",
+        "pressure_lowering": "pressure_lowering",
+        "tip_deflection_angle": "boom_deflection",
+    }
+    signals = {name: Signal(name, *sensors[topic], "") for name, topic in topics.items()}
+    time = np.arange(commands.size) * recorded.COMMAND_PERIOD
+    signals["valve_command"] = Signal("valve_command", time, commands, "1")
+    balances = Balances(experiment("run", Recording(signals, 0), machine), machine)
+    return balances, balances.residuals([machine])[0]
+
+
+def rms(missing: recorded.Array) -> dict[str, float]:
+    return dict(zip(BALANCES, np.sqrt(np.mean(missing**2, axis=0)), strict=True))
+
+
+def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
+    _, missing = residuals(machine, None)
+    found = rms(missing)
+    # From the resolver alone: a parabola through 100 angles of 1 s, a line through 50 of 0.5 s,
+    # each angle off by a step's uniform error; 2 for the pressures' noise and the smoothing.
+    step = recorded.STEP / np.sqrt(12.0)
+    arm, inertia = 0.64, 5000.0 * 22.5**2 / 3.0
+    assert found["force"] < 2.0 * np.sqrt(4.0 * 180.0 / 100.0) * step * inertia / arm
+    slope = np.sqrt(12.0 / 50.0) / 0.5 * step * arm
+    assert found["lifting_chamber"] < 2.0 * slope * machine.cylinder.area_lifting + 4e-6
+    assert found["lowering_chamber"] < 2.0 * slope * machine.cylinder.area_lowering + 4e-6
+    assert found["linkage"] < 1e-9
+    assert found["bending"] < machine.sensors.deflection_noise
+
+
+def test_friction_shows_in_the_force_balance_and_leaves_the_chambers_quiet(
+    machine: Machine,
+) -> None:
+    _, quiet = residuals(machine, None)
+    balances, missing = residuals(machine, lambda _, v: FRICTION * float(np.tanh(v / 1e-3)))
+    velocity = balances.average(balances.velocity)
+    steady = np.abs(velocity) > 0.015
+    force = missing[:, 0]
+    assert np.median(force[steady & (velocity > 0.0)]) == pytest.approx(-FRICTION, rel=0.05)
+    assert np.median(force[steady & (velocity < 0.0)]) == pytest.approx(FRICTION, rel=0.05)
+    assert rms(missing)["lifting_chamber"] < 1.5 * rms(quiet)["lifting_chamber"]
+    assert rms(missing)["lowering_chamber"] < 1.5 * rms(quiet)["lowering_chamber"]

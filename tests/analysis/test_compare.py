@@ -1,0 +1,160 @@
+"""The comparison's figures on signals whose figures are known, and what it shows of the paper."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emir_analysis import damping
+from emir_analysis.cli import main
+from emir_analysis.compare import MoveFigures, controllers, figures, run
+from emir_analysis.damping import damping_figures
+from emir_control.force_loop import ForceLoopParameters
+from emir_control.trajectory import TrajectoryParameters, named
+from emir_plant.plant import Plant
+from emir_plant.sheet import joint1
+
+FORTY_FIVE = math.radians(45.0)
+
+
+def _known_run() -> dict[str, np.ndarray]:
+    """Ramps up and down, followed 0.4 s late; the TCP swings from 1 s after the first stop on."""
+    control, fine = np.arange(0.0, 16.0, 0.032), np.arange(0.0, 16.0 - 0.024, 0.008)
+
+    def stroke(t: np.ndarray) -> np.ndarray:
+        return 0.02 * (np.clip(t - 2.0, 0.0, 3.0) - np.clip(t - 10.0, 0.0, 3.0))
+
+    def speed(t: np.ndarray) -> np.ndarray:
+        return 0.02 * (((t > 2.0) & (t < 5.0)) * 1.0 - ((t > 10.0) & (t < 13.0)))
+
+    swing = np.where((fine > 6.5) & (fine < 8.0), 0.03 * np.sin(2 * math.pi * fine), 0.0)
+    angle = 0.7 + stroke(fine - 0.4)
+    return {
+        "reference_stroke": stroke(control),
+        "reference_velocity": speed(control),
+        "true_stroke": stroke(fine - 0.4),
+        "true_velocity": speed(fine - 0.4),
+        "true_angle": angle,
+        "tcp_deflection": -0.25 * np.cos(angle) + swing,
+    }
+
+
+def test_figures_of_a_known_run() -> None:
+    lift, lower = figures(_known_run())
+    for move in (lift, lower):
+        assert move.lag == pytest.approx(0.4, abs=0.01)
+        assert move.error == pytest.approx(0.02 * 0.4, rel=1e-6)
+    assert lift.up == pytest.approx(0.0, abs=1e-12)  # the sag of each posture is taken off
+    assert lift.after == lift.settled == pytest.approx(0.03, rel=1e-3)
+    assert lower.after == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def moves() -> dict[str, list[MoveFigures]]:
+    """The paper's move at 45 deg, empty: lift, lower."""
+    trajectory = named("lift-lower", TrajectoryParameters())
+    return {
+        name: figures(run(joint1(), trajectory, outer, FORTY_FIVE))
+        for name, outer in controllers().items()
+    }
+
+
+def test_conventional_control_lags_by_its_time_constant(
+    moves: dict[str, list[MoveFigures]],
+) -> None:
+    for move in moves["cascade"]:
+        assert move.lag == pytest.approx(0.4, abs=0.05)  # paper 3.2
+
+
+@pytest.mark.parametrize("controller", ["pfc", "pfc_tip"])
+def test_predictive_control_is_smoother_and_bends_the_boom_less(
+    controller: str, moves: dict[str, list[MoveFigures]]
+) -> None:
+    """The paper's order of merit against conventional control (3.3, Fig. 9, 11, 12)."""
+    for ours, conventional in zip(moves[f"{controller}, preview"], moves["cascade"], strict=True):
+        assert ours.roughness < 0.75 * conventional.roughness
+        assert max(ours.up, -ours.down) < 0.75 * max(conventional.up, -conventional.down)
+        assert ours.settled < 0.5 * conventional.settled
+        assert abs(ours.lag) < 0.1
+
+
+def test_without_a_lag_the_preview_is_what_makes_the_boom_bend_less(
+    moves: dict[str, list[MoveFigures]],
+) -> None:
+    for known, guessed in zip(moves["pfc, preview"], moves["pfc, velocity"], strict=True):
+        assert -known.down < 0.75 * -guessed.down
+        assert known.after < 0.75 * guessed.after
+
+
+def test_capillary_line_damps_lets_the_boom_sink_and_wastes_oil() -> None:
+    """Why the paper rejects it (3.1); a leak of nothing costs nothing."""
+    undamped = ForceLoopParameters(gain=0.0)
+    none, some, more = (damping_figures(joint1(), c, undamped) for c in (0.0, 2e-11, 1e-10))
+    assert none.damping < some.damping < more.damping
+    assert none.sinking == pytest.approx(0.0, abs=1e-4)
+    assert 0.1 < some.sinking < more.sinking
+    assert none.lifting == pytest.approx(0.0, abs=0.03)  # the sagging pressure gives some back
+    assert none.lifting < some.lifting < more.lifting
+    plant = Plant(joint1())
+    shown = plant.outputs(plant.initial(FORTY_FIVE, 2e6))
+    leak = 1e-10 * (shown.pressure_lifting - shown.pressure_lowering)
+    assert more.at_rest == pytest.approx(leak, rel=1e-9)
+
+
+def test_damping_is_seen_in_the_machines_swing_after_a_stop() -> None:
+    """What the linear figure says of the slow mode, the nonlinear machine shows."""
+    period = round(1.0 / (0.69 * 0.032))  # control periods of the slow mode's swing
+    left = []
+    for leakage, force_loop in damping.WAYS.values():
+        velocity = damping.swing(joint1(), leakage, force_loop)[22:]
+        left.append(np.ptp(velocity[2 * period : 3 * period]) / np.ptp(velocity[:period]))
+    neither, *lines, feedback = left
+    assert neither > lines[0] > lines[1] > lines[2] > feedback
+
+
+def test_compare_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image = tmp_path / "compare.png"
+    words = ["--controllers", "cascade", "pfc, preview", "--picture", str(image)]
+    assert main(["compare", *words]) == 0
+    out = capsys.readouterr().out
+    assert out.count("| lift |") == out.count("| lower |") == 2
+    assert image.read_bytes().startswith(b"\x89PNG")
+    assert main(["compare", "--repeat", "2", "--controllers", "pfc, preview"]) == 0
+    assert capsys.readouterr().out.count(" \u00b1 ") == 2 * 7
+    assert main(["compare", "--payload", "1500", "--angle", "30", "--controllers", "cascade"]) == 0
+    assert "30 deg, 1500 kg: at 30.0 deg the boom needs" in capsys.readouterr().out
+    image.unlink()
+    assert main(["compare", "--damping", "--picture", str(image)]) == 0
+    assert image.exists()
+    assert "force feedback" in capsys.readouterr().out
+
+
+def test_figures_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", "--only", "9,12", "--out", str(tmp_path / "new")]) == 0
+    files = sorted((tmp_path / "new").iterdir())
+    assert [file.name for file in files] == ["figure_09.png", "figure_12.png"]
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
+    for only, said in (("7", "figure 7: there are 9, 11, 12"), ("9;11", "not numbers")):
+        assert main(["figures", "--only", only, "--out", str(tmp_path)]) == 1
+        assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--controllers", "magic"], "controller 'magic': there are cascade; pfc, preview"),
+        (["--repeat", "0"], "repeat = 0: at least 1"),
+        (["--trajectory", "hold"], "nothing moves in it"),
+        (["--trajectory", "loop"], "there are lift-lower"),
+        (["--payload", "-1", "--controllers", "cascade"], "geometry.payload = -1"),
+        (["--angle", "30", "45", "--picture", "x.png"], "one picture shows one posture"),
+    ],
+)
+def test_bad_input_is_one_clear_line(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *words]) == 1
+    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("emir ")]
+    assert len(errors) == 1
+    assert said in errors[0]

@@ -1,0 +1,184 @@
+"""Machines that another integrator simulated, with effects written a second time."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import recorded
+
+from emir_analysis.diagnosis import Diagnosis, command, summary
+from emir_analysis.diagnosis.unknowns import unknowns, with_values
+from emir_analysis.errors import InputError
+from emir_plant.parameters import Machine
+from emir_plant.sheet import load_sheet
+
+# of the tolerances: bending frequency, beta, nominal flow, lowering edge
+BUILT = np.array([0.5, -0.4, 0.6, -0.5])
+DURATION = 24.0  # s
+
+Topics = dict[str, tuple[recorded.Array, recorded.Array]]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with data sheet and signal map."""
+    path = tmp_path_factory.mktemp("rig")
+    (path / "datasheet.yaml").write_text(recorded.DATA_SHEET)
+    (path / "signals.yaml").write_text(recorded.SIGNAL_MAP)
+    return path
+
+
+@pytest.fixture(scope="module")
+def built(folder: Path) -> Machine:
+    """A machine within the tolerances, not as stated."""
+    return unknowns(load_sheet(folder / "datasheet.yaml")).at(BUILT)
+
+
+def diagnose(folder: Path, bag: Path, judge: Path | None = None) -> Diagnosis:
+    """Diagnose a recording with the folder's data sheet; leave JSON and HTML beside it."""
+    sheet, signals = folder / "datasheet.yaml", folder / "signals.yaml"
+    reports = bag.with_suffix(".json"), bag.with_suffix(".html")
+    return command(bag, sheet, signals, judge, *reports, lambda _: None)
+
+
+def test_a_healthy_machine_gets_its_parameters_and_no_effect(
+    folder: Path, built: Machine, tmp_path: Path
+) -> None:
+    recorded.record_machine(tmp_path / "a", built, DURATION, seed=3)
+    recorded.record_machine(tmp_path / "b", built, DURATION, seed=4)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
+    assert result.verdict == "nothing_missing", summary(result)
+    assert result.effects == ()
+    sheet = load_sheet(folder / "datasheet.yaml")
+    stated = dict(zip(sheet.tolerances, unknowns(sheet).members, strict=True))
+    for (path, unknown), x in zip(stated.items(), BUILT, strict=True):
+        fitted = result.parameters[path]
+        assert abs(fitted.value - unknown.value(x)) < 0.05 * unknown.scale, path
+        assert fitted.low < fitted.value < fitted.high
+    for signal in result.signals.values():  # on a recording that the fit has not seen
+        assert signal.refitted < 1.1 * signal.noise < signal.nominal
+
+
+def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_path: Path) -> None:
+    def friction(_: float, velocity: float) -> float:
+        return 15e3 * float(np.tanh(velocity / 1e-3))
+
+    recorded.record_machine(tmp_path / "a", built, DURATION, 3, friction)
+    recorded.record_machine(tmp_path / "b", built, DURATION, 4, friction)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
+    assert result.verdict == "found", summary(result)
+    (effect,) = result.effects
+    assert (effect.name, effect.balance) == ("coulomb_friction", "force")
+    assert effect.parameters["force"].value == pytest.approx(15e3, rel=0.02)
+    for signal in result.signals.values():
+        assert signal.with_effect < 1.2 * signal.noise < 0.5 * signal.refitted
+    written = json.loads((tmp_path / "a.json").read_text())
+    assert written["verdict"] == "found"
+    assert written["effects"][0]["parameters"]["force"]["unit"] == "N"
+    assert written["balances"]["force"].keys() == {"unit", "noise", "before", "refitted", "after"}
+    assert (tmp_path / "a.html").read_text().count("<img") == 3
+
+
+def test_an_effect_outside_the_registry_is_called_unexplained(
+    folder: Path, built: Machine, tmp_path: Path
+) -> None:
+    def tight_spot(stroke: float, velocity: float) -> float:
+        return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
+
+    recorded.record_machine(tmp_path / "a", built, DURATION, 3, tight_spot)
+    result = diagnose(folder, tmp_path / "a")
+    assert result.verdict == "unexplained", summary(result)
+    assert result.effects == ()
+    assert "balance force" in result.statement
+    assert result.balances["force"].after > 10.0 * result.balances["force"].noise
+    quiet = result.balances["lifting_chamber"]
+    assert quiet.after < 1.5 * quiet.noise
+
+
+def test_values_are_set_by_path(built: Machine) -> None:
+    changed = with_values(built, {"valve.dead_zone": 0.2, "effects.payload.mass": 50.0})
+    assert (changed.valve.dead_zone, changed.effects.payload.mass) == (0.2, 50.0)
+    assert changed.cylinder == built.cylinder
+
+
+def _still(topics: Topics) -> None:
+    time, value = topics["joint_states"]
+    topics["joint_states"] = (time, np.full_like(value, value[0]))
+
+
+def _closed(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    topics["valve_command"] = (time, 0.05 * np.sign(value))
+
+
+def _moving(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    topics["valve_command"] = (time, np.full_like(value, 0.4))
+
+
+def _gap(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    kept = (time < 5.0) | (time > 6.0)
+    topics["pressure_lifting"] = (time[kept], value[kept])
+
+
+def _short(topics: Topics) -> None:
+    for name, (time, value) in topics.items():
+        topics[name] = (time[:200], value[:200])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (_still, "never moves"),
+        (_closed, "never leaves the dead zone"),
+        (_moving, "a second at rest"),
+        (_gap, "gap of 1.0"),
+        (_short, "record at least 10 s"),
+    ],
+)
+def test_a_recording_of_no_use_is_told_with_what_to_record(
+    folder: Path, tmp_path: Path, spoil: Callable[[Topics], None], reason: str
+) -> None:
+    time = np.arange(1500) * 0.01
+    swing = np.pi / 4.0 + 0.1 * np.sin(time)
+    sensors = ("joint_states", "cylinder", "pressure_lifting", "pressure_lowering")
+    topics = dict.fromkeys((*sensors, "boom_deflection"), (time, swing))
+    topics["valve_command"] = (time, 0.4 * (time > 1.0))
+    spoil(topics)
+    recorded.write_bag(tmp_path / "bag", topics)
+    with pytest.raises(InputError, match=reason) as told:
+        diagnose(folder, tmp_path / "bag")
+    assert "\n" not in str(told.value)
+
+
+def test_another_unit_is_told(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "signals.yaml").write_text(recorded.SIGNAL_MAP.replace("unit: Pa", "unit: bar"))
+    with pytest.raises(InputError, match="pressure_lifting in bar, expected Pa"):
+        command(
+            tmp_path,
+            folder / "datasheet.yaml",
+            tmp_path / "signals.yaml",
+            None,
+            None,
+            None,
+            lambda _: None,
+        )
+
+
+def test_the_healthy_machine_of_the_reference_recordings(shared: Path) -> None:
+    rig = shared / "recordings"
+    result = command(
+        rig / "elm_a",
+        rig / "datasheet.yaml",
+        rig / "signals.yaml",
+        rig / "elm_b",
+        None,
+        None,
+        lambda _: None,
+    )
+    assert result.verdict == "nothing_missing", summary(result)
+    for signal in result.signals.values():
+        assert signal.refitted < 1.1 * signal.noise

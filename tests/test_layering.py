@@ -38,7 +38,11 @@ sys.modules.update(dict.fromkeys(ros))  # None there makes an import of it fail
 for package in packages:
     folder = import_module(package).__path__
     for module in pkgutil.walk_packages(folder, f"{package}.", onerror=import_module):
-        import_module(module.name)
+        try:
+            import_module(module.name)
+        except ModuleNotFoundError as error:
+            if error.name != "pinocchio":  # the robot's mechanics are an extra
+                raise
 
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1

@@ -1,0 +1,217 @@
+"""The six actuators on their one pump: the parameters of each, and their equations.
+
+Each is the actuator of `emir_plant.hydraulics` with its own areas, chambers and valve size. The
+base turns on a motor: its "stroke" is its angle, its areas the displacement per angle, its
+chambers do not change. No logic block there: it carries no weight.
+
+The state of all actuators is (1 + 6 * 5,): the supply pressure, then of base and joints 1-5 the
+five of `emir_plant.core`.
+"""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError
+from emir_plant.core import LOGIC, P_H, P_S, SPOOL, SPOOL_RATE
+from emir_plant.effects import REGISTRY, Effects, terms
+from emir_plant.hydraulics import chambers, logic_block, valve
+from emir_plant.hydraulics.flows import Pressures, delivered, flows
+from emir_plant.jit import compiled
+from emir_plant.parameters import Machine
+from emir_plant.record import record
+from emir_plant.robot.parameters import Drive, Robot
+from emir_plant.robot.reach import Reach
+
+Array = NDArray[np.float64]
+
+ACTUATORS = 6
+EACH = 5  # states of an actuator
+SIZE = 1 + ACTUATORS * EACH
+SUPPLY = 0  # index of the supply pressure
+
+EFFECTS = (  # those without a memory of their own, on joint 1
+    "coulomb_friction",
+    "stribeck_friction",
+    "viscous_friction",
+    "pressure_dependent_friction",
+    "payload",
+    "internal_leakage",
+    "external_leakage",
+    "entrained_air",
+    "vessel_compliance",
+    "valve_null_offset",
+    "valve_gain_asymmetry",
+    "valve_dead_zone_error",
+    "logic_block_fault",
+)
+
+PRESSURE, FLOW, SLOPE, STIFFNESS = 0, 1, 2, 3  # of `pump_record`
+
+
+def machines(robot: Robot, reaches: tuple[Reach, ...]) -> tuple[Machine, ...]:
+    """Return base and joints 1-5, each as a main joint of its own size.
+
+    Effects act on joint 1, as in its own model, the payload on all. Raises ParameterError for an
+    effect that is switched on and has no place here.
+    """
+    effects = robot.main.effects
+    for name, kind in REGISTRY.items():
+        on = any(getattr(getattr(effects, name), size) != 0.0 for size in kind.sizes)
+        if on and name not in EFFECTS:
+            raise ParameterError(f"effects.{name}: not in the model of the whole robot")
+    others = (
+        _scaled(robot.main, joint.drive, reach)
+        for joint, reach in zip(robot.four_bars, reaches[1:], strict=True)
+    )
+    return (_motor(robot), robot.main, *others)
+
+
+def records(robot: Robot, reaches: tuple[Reach, ...]) -> NDArray[Any]:
+    """Return the parameters of all actuators as the compiled functions read them, (6,)."""
+    return np.concatenate([record(machine) for machine in machines(robot, reaches)])
+
+
+def pump_record(robot: Robot) -> Array:
+    """Return (4,): set pressure, largest flow, flow per pressure missing, stiffness of the line."""
+    pump, main = robot.pump, robot.main
+    slope = pump.flow_max / pump.droop
+    return np.array([main.supply.p0, pump.flow_max, slope, main.cylinder.beta / pump.line_volume])
+
+
+def _scaled(main: Machine, drive: Drive, reach: Reach) -> Machine:
+    lifting = math.pi * drive.bore**2 / 4.0
+    lowering = lifting - math.pi * drive.rod**2 / 4.0
+    values = {
+        "cylinder.area_lifting": lifting,
+        "cylinder.area_lowering": lowering,
+        "cylinder.volume_lifting_0": drive.dead_volume_lifting - lifting * reach.stroke_low,
+        "cylinder.volume_lowering_0": drive.dead_volume_lowering + lowering * reach.stroke_high,
+        "valve.flow_ratio_lowering": 1.1 * lowering / lifting,
+    }
+    return _valve_sized(main, drive.flow_nominal, values)
+
+
+def _motor(robot: Robot) -> Machine:
+    base = robot.base
+    values = {
+        "cylinder.area_lifting": base.displacement,
+        "cylinder.area_lowering": base.displacement,
+        "cylinder.volume_lifting_0": base.chamber,
+        "cylinder.volume_lowering_0": base.chamber,
+        "valve.flow_ratio_lowering": 1.0,
+        "logic_block.threshold": 0.0,
+    }
+    return _valve_sized(robot.main, base.flow_nominal, values)
+
+
+def _valve_sized(main: Machine, flow: float, values: dict[str, float]) -> Machine:
+    """Return the machine with a valve and lines that drop the main joint's pressures at `flow`."""
+    share = (main.valve.flow_nominal / flow) ** 2
+    values |= {
+        f"resistances.{field.name}": getattr(main.resistances, field.name) * share
+        for field in dataclasses.fields(main.resistances)
+    }
+    values |= {"valve.flow_nominal": flow}
+    return with_values(dataclasses.replace(main, effects=Effects()), values)
+
+
+@compiled
+def _valve_flows(x: Array, supply: float, p: Any) -> tuple[float, float, float]:
+    """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
+    opening = terms.opening(valve.opening(x[SPOOL], p), 0.0, p)
+    lifting, lowering = flows(opening, Pressures(supply, x[P_H], x[P_S]), x[LOGIC], p)
+    return lifting, lowering, delivered(opening, lifting, lowering)
+
+
+@compiled
+def _write_actuator(
+    x: Array, command: float, supply: float, motion: tuple[float, float], p: Any, dx: Array
+) -> float:
+    """Write an actuator's rates, (5,), to dx; return what it draws from the pump, m^3/s.
+
+    supply: pressure at the pump, Pa. motion: stroke, m, which changes the chambers' volumes, and
+    velocity, m/s, which sweeps them.
+    """
+    stroke, velocity = motion
+    lifting, lowering, drawn = _valve_flows(x, supply, p)
+    leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
+    volume = chambers.volume_lifting(stroke, p)
+    stiffness = terms.stiffness(x[P_H], volume, p.vessel_compliance_lifting, p)
+    surplus = lifting - leak_lifting - chambers.relief_flow(x[P_H], p) - p.area_lifting * velocity
+    dx[P_H] = chambers.pressure_rate(surplus, volume, x[P_H], stiffness)
+    volume = chambers.volume_lowering(stroke, p)
+    stiffness = terms.stiffness(x[P_S], volume, p.vessel_compliance_lowering, p)
+    surplus = lowering - leak_lowering - chambers.relief_flow(x[P_S], p)
+    surplus += p.area_lowering * velocity
+    dx[P_S] = chambers.pressure_rate(surplus, volume, x[P_S], stiffness)
+    dx[SPOOL] = x[SPOOL_RATE]
+    dx[SPOOL_RATE] = valve.spool_acceleration(command, x[SPOOL], x[SPOOL_RATE], p)
+    pilot = logic_block.pilot_pressure(x[P_H], x[P_S], p)
+    dx[LOGIC] = logic_block.opening_rate(x[LOGIC], pilot, p)
+    return drawn
+
+
+@compiled
+def write_rates(
+    x: Array, commands: Array, motion: Array, actuators: NDArray[Any], pump: Array, dx: Array
+) -> None:
+    """Write dx/dt of all actuators, (31,), to dx.
+
+    commands: (6,). motion: (2 or more, 6), strokes and velocities. actuators: (6,) records.
+    pump: see `pump_record`; it feeds all, and what they draw makes its pressure fall.
+    """
+    drawn = 0.0
+    for k in range(ACTUATORS):
+        own = slice(1 + k * EACH, 1 + (k + 1) * EACH)
+        stroke = motion[0, k] if k > 0 else 0.0  # the motor's chambers keep their volume
+        moving = (stroke, motion[1, k])
+        drawn += _write_actuator(x[own], commands[k], x[SUPPLY], moving, actuators[k], dx[own])
+    wanted = (pump[PRESSURE] - x[SUPPLY]) * pump[SLOPE]
+    dx[SUPPLY] = (min(max(wanted, 0.0), pump[FLOW]) - drawn) * pump[STIFFNESS]
+
+
+@compiled
+def limit(x: Array) -> None:
+    """Keep the chambers' pressures from going below 0, in place: oil does not pull."""
+    for k in range(ACTUATORS):
+        own = x[1 + k * EACH : 1 + (k + 1) * EACH]
+        own[P_H], own[P_S] = max(own[P_H], 0.0), max(own[P_S], 0.0)
+
+
+@compiled
+def oil_force(x: Array, k: int, actuators: NDArray[Any]) -> float:
+    """Return the oil's force on actuator k's piston, N; N m on the base."""
+    own = x[1 + k * EACH : 1 + (k + 1) * EACH]
+    return chambers.piston_force(own[P_H], own[P_S], actuators[k])
+
+
+@compiled
+def forces(x: Array, velocities: Array, actuators: NDArray[Any], result: Array) -> None:
+    """Write the forces of oil and friction on the pistons, (6,), N, and N m on the base."""
+    for k in range(ACTUATORS):
+        oil = oil_force(x, k, actuators)
+        result[k] = oil - terms.friction(velocities[k], oil, actuators[k])
+
+
+@compiled
+def friction_slope(velocity: float, load: float, p: Any) -> float:
+    """Return d(friction)/d(velocity), N s/m, at a piston velocity, m/s, never negative.
+
+    load: force of the oil on the piston, N.
+    """
+    step = 1e-5
+    rise = terms.friction(velocity + step, load, p) - terms.friction(velocity - step, load, p)
+    return max(rise / (2.0 * step), 0.0)
+
+
+@compiled
+def flows_of(x: Array, k: int, actuators: NDArray[Any]) -> tuple[float, float]:
+    """Return actuator k's flows through its valve into its chambers, m^3/s."""
+    own = x[1 + k * EACH : 1 + (k + 1) * EACH]
+    lifting, lowering, _ = _valve_flows(own, x[SUPPLY], actuators[k])
+    return lifting, lowering

@@ -1,0 +1,66 @@
+"""Reading the robot from YAML: nested groups, each entry `name: {value, unit, source}`."""
+
+import dataclasses
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import yaml
+
+from emir_common.quantity import ParameterError, quantities
+from emir_plant.parameters import Machine
+from emir_plant.robot.parameters import Robot
+from emir_plant.sheet import joint1
+
+
+def robot() -> Robot:
+    """Return the robot as the project states it (data/robot.yaml and data/joint1.yaml)."""
+    return load_robot(Path(str(files("emir_plant") / "data" / "robot.yaml")), joint1())
+
+
+def load_robot(path: Path, main: Machine) -> Robot:
+    """Read a robot from YAML; `main` is its main joint.
+
+    Raises ParameterError, naming file and key, for a file that cannot be read, a missing or
+    unknown key, another unit, a value outside its range.
+    """
+    try:
+        content = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror}") from None
+    except yaml.YAMLError as error:
+        raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    try:
+        return _group(Robot, content, "", {"main": main})
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def _group(kind: Any, content: Any, prefix: str, given: dict[str, Any] | None = None) -> Any:
+    """Return a parameter dataclass from a map; `given` fields do not stand in the file."""
+    values = dict(given or {})
+    if not isinstance(content, dict):
+        raise ParameterError(f"{prefix.rstrip('.') or 'file'}: no parameters in it")
+    hints, declared = get_type_hints(kind), quantities(kind)
+    wanted = {field.name for field in dataclasses.fields(kind)} - values.keys()
+    for name in content.keys() - wanted:
+        raise ParameterError(f"{prefix}{name}: there is no such parameter")
+    for name in sorted(wanted - content.keys()):
+        raise ParameterError(f"{prefix}{name}: missing")
+    for name in wanted:
+        path = prefix + name
+        if name not in declared:
+            values[name] = _group(hints[name], content[name], path + ".")
+            continue
+        value = _entry(content[name], path, declared[name].unit)
+        declared[name].check(path, value)
+        values[name] = value
+    return kind(**values)
+
+
+def _entry(entry: Any, path: str, unit: str) -> Any:
+    if not isinstance(entry, dict) or "value" not in entry:
+        raise ParameterError(f"{path}: no value")
+    if entry.get("unit", "1") != unit:
+        raise ParameterError(f"{path}: in {entry.get('unit', '1')}, expected {unit}")
+    return entry["value"]

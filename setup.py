@@ -47,8 +47,13 @@ setup(
         "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
         # The whole robot's mechanics; the main joint does without.
         "robot": ["pin>=4.1"],
-        "test": ["control>=0.10",
-            "mujoco>=3.2", "pytest>=8.2", "pytest-timeout>=2.3", "rosbags>=0.10"],
+        "test": [
+            "control>=0.10",
+            "mujoco>=3.2",
+            "pytest>=8.2",
+            "pytest-timeout>=2.3",
+            "rosbags>=0.10",
+        ],
         # What ruff and mypy report changes with every minor release: raise them on purpose.
         "lint": [
             "mypy~=2.4.1",

@@ -39,7 +39,6 @@ setup(
         "numba>=0.59",
         "numpy>=1.26",
         "pyyaml>=6.0.1",
-        "rich>=13.0",
         "scipy>=1.12",
     ],
     extras_require={

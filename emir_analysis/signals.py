@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
+from emir_common.quantity import ParameterError
+from emir_common.yaml_file import read_map
 
 Array = NDArray[np.float64]
 
@@ -69,13 +70,9 @@ def load(path: Path, signal_map: SignalMap) -> Recording:
 def read_signal_map(file: Path) -> dict[str, Source]:
     """Read a YAML map `name: {topic, field, unit}`. Raises InputError naming file and entry."""
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(content, dict) or not content:
-        raise InputError(f"{file}: no signals in it")
+        content = read_map(file, what="signals")
+    except ParameterError as error:
+        raise InputError(str(error)) from None
     return {str(name): _source(file, name, entry) for name, entry in content.items()}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from emir_common.quantity import ParameterError, quantities
+from emir_common.yaml_file import read_map
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import PfcParameters
 
@@ -27,13 +28,9 @@ def load(file: Path, output: str) -> PfcParameters:
     Raises ParameterError, naming the file, for what cannot be read, is missing, unknown, out of
     range or made for another output.
     """
+    content = read_map(file, what="design")
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
         return _parameters(content, output)
-    except OSError as error:
-        raise ParameterError(f"{file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
     except ParameterError as error:
         raise ParameterError(f"{file}: {error}") from None
 

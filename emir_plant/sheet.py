@@ -12,9 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
 
-import yaml
-
 from emir_common.quantity import ParameterError, quantities
+from emir_common.yaml_file import read_map
 from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
 
@@ -45,14 +44,7 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     strict: every key has to be known. Raises ParameterError, naming file and key, for a file
     that cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise ParameterError(f"{path}: {error.strerror}") from None
-    except yaml.YAMLError as error:
-        raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(content, dict):
-        raise ParameterError(f"{path}: no parameters in it")
+    content = read_map(path, what="parameters")
     try:
         return _sheet(content, strict=strict)
     except ParameterError as error:

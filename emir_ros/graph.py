@@ -13,6 +13,7 @@ import yaml
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
+from emir_common.yaml_file import read_map
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.topics import TOPICS
 
@@ -87,16 +88,8 @@ def read_parameters(file: Path | None) -> dict[str, dict[str, Any]]:
     """
     if file is None:
         return {}
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ParameterError(f"{file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(content, dict):
-        raise ParameterError(f"{file}: no node in it")
     found = {}
-    for node, entry in content.items():
+    for node, entry in read_map(file, what="node").items():
         if not isinstance(entry, dict) or not isinstance(entry.get("ros__parameters"), dict):
             raise ParameterError(f"{file}: {node}: ros__parameters is missing")
         name = node if node == EVERY_NODE else str(node).rsplit("/", 1)[-1]

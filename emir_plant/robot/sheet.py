@@ -5,9 +5,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
 
-import yaml
-
 from emir_common.quantity import ParameterError, quantities
+from emir_common.yaml_file import read_map
 from emir_plant.parameters import Machine
 from emir_plant.robot.parameters import Robot
 from emir_plant.sheet import joint1
@@ -24,12 +23,7 @@ def load_robot(path: Path, main: Machine) -> Robot:
     Raises ParameterError, naming file and key, for a file that cannot be read, a missing or
     unknown key, another unit, a value outside its range.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except OSError as error:
-        raise ParameterError(f"{path}: {error.strerror}") from None
-    except yaml.YAMLError as error:
-        raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    content = read_map(path, what="parameters")
     try:
         return _group(Robot, content, "", {"main": main})
     except ParameterError as error:

@@ -16,7 +16,7 @@ USAGE = """usage: emir COMMAND ...
   analyze    figures and pictures of a recording of the graph
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
-  figures    the paper's figures, drawn by this machine and its controllers
+  figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
 
 `emir COMMAND --help` tells more."""
@@ -130,12 +130,14 @@ def _figures(words: list[str]) -> int:
     everything = ",".join(map(str, FIGURES))
     parser = argparse.ArgumentParser(prog="emir figures")
     parser.add_argument("--only", default=everything, metavar="N,N", help=f"of {everything}")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for the PNG files")
+    folder = parser.add_mutually_exclusive_group(required=True)
+    folder.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="for all files")
+    folder.add_argument("--out", type=Path, metavar="DIR", help="the same")
     options = parser.parse_args(words)
     numbers = options.only.split(",")
     if not all(number.isdecimal() for number in numbers):
         raise InputError(f"--only {options.only}: not numbers with commas between")
-    for file in draw([int(number) for number in numbers], options.out, _progress):
+    for file in draw([int(number) for number in numbers], options.folder or options.out, _progress):
         print(file)
     return 0
 

@@ -40,6 +40,7 @@ class BoomModes:
     deflection: (m,) m, displacement of the TCP off the line of the first section, up positive.
     residual_sag: m, what the modes left out add to that, horizontal boom at rest.
     residual_compliance: m/N, what they add for a force across the boom at the TCP.
+    shapes: (sections, m) rotation of every section per modal coordinate, from the joint outwards.
     """
 
     frequency: Array
@@ -49,6 +50,7 @@ class BoomModes:
     deflection: Array
     residual_sag: float
     residual_compliance: float
+    shapes: Array
 
 
 def section_model(geometry: Geometry) -> SectionModel:
@@ -66,13 +68,13 @@ def section_model(geometry: Geometry) -> SectionModel:
     inertia = mass * centres.T @ centres + mass * length**2 / 12.0 * np.eye(sections)
     inertia += geometry.payload * np.outer(tip, tip)
     weight = GRAVITY * (mass * centres.sum(axis=0) + geometry.payload * tip)
-    join = _rigid_arm_joints(geometry)
+    join = rigid_arm_joints(geometry)
     return SectionModel(
         join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join
     )
 
 
-def _rigid_arm_joints(geometry: Geometry) -> Array:
+def rigid_arm_joints(geometry: Geometry) -> Array:
     """Return (sections, n): the last section of an arm turns with the first of the next."""
     sections = geometry.arms * geometry.sections_per_arm
     starts_arm = np.arange(sections) % geometry.sections_per_arm == 0
@@ -106,6 +108,7 @@ def boom_modes(geometry: Geometry) -> BoomModes:
         deflection=deflection[:kept],
         residual_sag=float(sag[kept:].sum()),
         residual_compliance=float(yielding[kept:].sum()),
+        shapes=rigid_arm_joints(geometry) @ shapes[:, :kept],
     )
 
 

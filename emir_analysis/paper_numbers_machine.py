@@ -1,0 +1,276 @@
+"""Numbers 1-13 of the paper: the machine, its valve and its sensors."""
+
+import math
+from collections.abc import Iterator
+from importlib.util import find_spec
+from itertools import pairwise
+
+import numpy as np
+
+from emir_analysis.closed_loop import PERIOD
+from emir_analysis.figure_flow import NORMAL, SUPPLIES, flow_curves
+from emir_analysis.figure_steps import ANGLES, LIFTING, LOWERING, Response, StepResponses
+from emir_analysis.paper_number import NOT_MEASURED, Number, is_about, judged
+from emir_common.parameter_tree import with_values
+from emir_plant import core, linkage
+from emir_plant.boom import section_model
+from emir_plant.core import Truth
+from emir_plant.linearize import linearize
+from emir_plant.parameters import Machine
+from emir_plant.plant import Plant, SimulationError
+from emir_plant.sensors import resolver
+from emir_plant.transfer import mechanics
+
+BAR = 1e5
+FORTY_FIVE, SEVENTY_FIVE = math.radians(45.0), math.radians(75.0)
+REST_PRESSURE = 2e6  # Pa, of the lowering chamber
+PAYLOAD = 1500.0  # kg, paper 1
+STRONGEST = 320e5  # Pa, paper 2.2: the pump's highest pressure
+RIGID = {"geometry.section_spring": 1e12}  # N m/rad, as stiff as the range allows
+WEAK = 0.2  # damping, below which a response swings through several times
+LINEAR = 0.05  # share, within which a curve is almost a straight line
+APART = 0.05  # share, from which on two frequencies differ
+NEEDS_ROBOT = "needs the extra robot"
+
+
+def measure(machine: Machine, steps: StepResponses) -> list[Number]:
+    """Return the numbers of a machine. Raises SimulationError where it cannot hold its boom."""
+    return [
+        _reach(machine),
+        _bodies(),
+        _orders(machine),
+        _bending_mode(machine),
+        _sag(machine),
+        _rigid_on_oil(machine),
+        _dominant_mode(machine),
+        _dead_zone(machine),
+        _bandwidth(machine),
+        _linearity(machine),
+        _logic_block(machine),
+        *_steps(machine, steps),
+        _resolver(machine),
+        Number(13, "sampling", "32 ms", f"{PERIOD * 1e3:g} ms", "period of the control loop",
+               judged(math.isclose(PERIOD, 0.032))),
+    ]  # fmt: skip
+
+
+def _reach(machine: Machine) -> Number:
+    reach = float(section_model(machine.geometry).tip.sum())
+    loaded = with_values(machine, {"geometry.payload": PAYLOAD, "supply.p0": STRONGEST})
+    try:
+        state = Plant(loaded).initial(0.0)
+    except SimulationError as error:
+        return Number(1, "reach, payload", "22.5 m, up to 1500 kg", f"{reach:.1f} m",
+                      "horizontal, held at 320 bar", judged(False), str(error))  # fmt: skip
+    return Number(
+        1, "reach, payload", "22.5 m, up to 1500 kg",
+        f"{reach:.1f} m; {PAYLOAD:g} kg held with p_H = {state[core.P_H] / BAR:.0f} bar",
+        "joint 1 to TCP; at rest, boom horizontal, pump 320 bar",
+        judged(is_about(reach, 22.5, 0.1)),
+    )  # fmt: skip
+
+
+def _bodies() -> Number:
+    what, paper, how = "main parts, bodies, DOF", "24, 39, 96", "counted in the robot's model"
+    if find_spec("pinocchio") is None:
+        return Number(2, what, paper, "", how, NOT_MEASURED, NEEDS_ROBOT)
+    from emir_plant.robot.dynamics import Mechanics  # noqa: PLC0415 (needs the extra)
+    from emir_plant.robot.sheet import robot  # noqa: PLC0415 (needs the extra)
+
+    found = Mechanics(robot())
+    bodies = [name for name in found.topology.bodies if name != "column"]
+    # an arm's sections are one part
+    parts = {name.partition("_section")[0] for name in bodies}
+    ours = len(parts), len(bodies), found.size
+    return Number(2, what, paper, ", ".join(map(str, ours)), how, judged(ours == (24, 39, 96)))
+
+
+def _orders(machine: Machine) -> Number:
+    found = mechanics(Plant(machine), FORTY_FIVE)
+    functions = found.stroke(), found.joint_angle(), found.tip_angle()
+    orders = {(f.numerator.size - 1, f.denominator.size - 1) for f in functions}
+    return Number(
+        3, "G_h, G_alpha1, G_alpha6", "numerator 8, denominator 10",
+        "; ".join(f"numerator {n}, denominator {d}" for n, d in orders),
+        "degrees of the polynomials at 45 deg", judged(orders == {(8, 10)}),
+    )  # fmt: skip
+
+
+def _bending_mode(machine: Machine) -> Number:
+    poles = np.linalg.eigvals(mechanics(Plant(machine), FORTY_FIVE).state_space()[0])
+    poles = poles[poles.imag > 1.0]
+    slowest = poles[abs(poles).argmin()]
+    frequency, damping = abs(slowest) / (2.0 * math.pi), -slowest.real / abs(slowest)
+    return Number(
+        4, "slowest mode of the mechanics", "about 5.4 Hz, weakly damped",
+        f"{frequency:.2f} Hz, damping {damping:.3f}", "pole, 45 deg, piston force held",
+        judged(is_about(frequency, 5.4, 0.1) and damping < WEAK),
+    )  # fmt: skip
+
+
+def _sag(machine: Machine) -> Number:
+    plant = Plant(machine)
+    sag = -plant.outputs(plant.initial(FORTY_FIVE)).tcp_deflection
+    return Number(5, "static deflection of the TCP", "about 18 cm", f"{sag * 1e2:.1f} cm",
+                  "at rest, 45 deg, empty, off the line of the first section",
+                  judged(is_about(sag, 0.18, 0.01)))  # fmt: skip
+
+
+def _rigid_on_oil(machine: Machine) -> Number:
+    loaded = Plant(with_values(machine, RIGID | {"geometry.payload": PAYLOAD}))
+    empty = Plant(with_values(machine, RIGID))
+    ours, other = _slowest(loaded, SEVENTY_FIVE), _slowest(empty, FORTY_FIVE)
+    return Number(
+        6, "rigid mechanics on the oil", "about 0.5 Hz", f"{ours:.2f} Hz",
+        "linearized at rest, section springs 1e12 N m/rad, 75 deg, 1500 kg",
+        judged(is_about(ours, 0.5, 0.1)),
+        f"posture and load are not stated; at 45 deg and empty {other:.2f} Hz",
+    )  # fmt: skip
+
+
+def _dominant_mode(machine: Machine) -> Number:
+    ours = _slowest(Plant(machine), FORTY_FIVE)
+    return Number(
+        7, "dominant mode", "about 0.7 Hz", f"{ours:.2f} Hz", "linearized at rest, 45 deg, empty",
+        judged(is_about(ours, 0.7, 0.1)),
+    )  # fmt: skip
+
+
+def _slowest(plant: Plant, angle: float) -> float:
+    frequency, _ = linearize(plant, plant.initial(angle, REST_PRESSURE)).modes()
+    return float(frequency[0])
+
+
+def _dead_zone(machine: Machine) -> Number:
+    plant = Plant(machine)
+    state = plant.initial(FORTY_FIVE, REST_PRESSURE)
+
+    def flows(spool: float) -> bool:
+        x = state.copy()
+        x[core.SPOOL] = spool
+        shown = plant.outputs(x)
+        return shown.flow_lifting != 0.0 or shown.flow_lowering != 0.0
+
+    shut = [y for y in np.linspace(-0.5, 0.5, 1001) if not flows(float(y))]
+    return Number(
+        8, "valve: dead zone", "+-10 %", f"{min(shut):+.1%} to {max(shut):+.1%}",
+        "positions of the spool in steps of 0.1 % at which no oil flows",
+        judged(is_about(-min(shut), 0.1, 0.01) and is_about(max(shut), 0.1, 0.01)),
+    )  # fmt: skip
+
+
+def _bandwidth(machine: Machine) -> Number:
+    plant = Plant(machine)
+    model = linearize(plant, plant.initial(FORTY_FIVE, REST_PRESSURE))
+    row = model.C[Truth._fields.index("spool")]
+    frequencies = np.arange(0.1, 100.0, 0.1)
+    eye = np.eye(len(model.A))
+    answer = np.array(
+        [
+            row @ np.linalg.solve(2j * math.pi * f * eye - model.A, model.B[:, 0])
+            for f in frequencies
+        ]
+    )
+    quarter = float(frequencies[np.argmax(np.unwrap(np.angle(answer)) <= -0.5 * math.pi)])
+    power = float(frequencies[np.argmax(abs(answer) <= math.sqrt(0.5))])
+    return Number(
+        8, "valve: bandwidth", "about 30 Hz", f"{quarter:.1f} Hz",
+        "where the spool lags y2 by 90 deg, linear model", judged(is_about(quarter, 30.0, 1.0)),
+        f"by the other reading, -3 dB, {power:.1f} Hz",
+    )  # fmt: skip
+
+
+def _linearity(machine: Machine) -> Number:
+    said, met = [], False
+    for curve in flow_curves(machine):
+        stuck = [s for s in SUPPLIES if s >= NORMAL and math.isnan(curve.nonlinearity(s))]
+        if stuck:
+            said.append(f"{curve.load}: nothing flows at {', '.join(f'{s:g}' for s in stuck)} bar")
+            continue
+        met = met or max(curve.worst(), curve.spread()) <= LINEAR
+        said.append(f"{curve.load}: off a line {curve.worst():.1%}, apart {curve.spread():.1%}")
+    return Number(
+        9, "Q(p0, y2)", "almost linear in y2 for 100-320 bar", "; ".join(said),
+        "largest distance from the best line, and of the supplies' curves, of the largest flow",
+        judged(met), "where the load leaves pressure for the valve, by the ideal pressure balance",
+    )  # fmt: skip
+
+
+def _logic_block(machine: Machine) -> Number:
+    plant = Plant(machine)
+
+    def time_constant(opening: float, pressure: float, towards: float) -> float:
+        x = plant.initial(FORTY_FIVE, REST_PRESSURE)
+        x[core.LOGIC], x[core.P_H], x[core.P_S] = opening, pressure, pressure
+        return float((towards - opening) / plant.derivative(x, 0.0)[core.LOGIC])
+
+    threshold = machine.logic_block.threshold
+    opening = time_constant(0.0, 1.01 * threshold, 1.0)
+    closing = time_constant(1.0, 0.99 * threshold, 0.0)
+    return Number(
+        10, "logic block", "opens very fast, closes with about 0.3 s, threshold",
+        f"{opening * 1e3:.0f} ms, {closing:.2f} s, {threshold / BAR:.0f} bar",
+        "rate of the block 1 % above and below the threshold; the pilot chamber is a parameter",
+        judged(is_about(closing, 0.3, 0.1) and opening < 0.1 * closing),
+    )  # fmt: skip
+
+
+def _steps(machine: Machine, steps: StepResponses) -> Iterator[Number]:
+    here, elsewhere = ANGLES
+    lifting, lowering = steps.of(here, LIFTING), steps.of(here, LOWERING)
+    most = max(r.mode.damping for r in lifting + lowering)
+    yield Number(
+        11, "step responses: weakly damped", "weakly damped", f"damping up to {most:.3f}",
+        f"fit to the tip's angular velocity from {here:g} deg, below {WEAK:g}", judged(most < WEAK),
+    )  # fmt: skip
+    wide = [r for r in steps.wide if r.angle == here]
+    yield _falling("lifting", lifting,
+                   "a turbulent return edge damps the more, the more flows; with a return edge of"
+                   f" 3 bar at full speed {_dampings(wide)}, at {wide[0].mode.frequency:.2f}"
+                   f" to {wide[-1].mode.frequency:.2f} Hz")  # fmt: skip
+    yield _falling(
+        "lowering", lowering, "the return edge, as when lifting; no reading turns it so far"
+    )
+    closings, lowest = sum(r.interruptions for r in lowering), min(r.lowest for r in lowering)
+    yield Number(
+        11, "step responses: lowering interrupted", "cyclically, by the logic block",
+        f"{closings} closings", f"logic block in all lowering steps from {here:g} deg",
+        judged(closings > 0), "" if closings else
+        f"p_H stays at {lowest / BAR:.0f} bar and more, above the threshold of"
+        f" {machine.logic_block.threshold / BAR:.0f} bar",
+    )  # fmt: skip
+    pair = [steps.of(angle, LIFTING)[0].mode for angle in (here, elsewhere)]
+    differ = abs(pair[1].frequency / pair[0].frequency - 1.0) > APART
+    yield Number(
+        11, "step responses: posture", "differ with it",
+        "; ".join(f"{a:g} deg {m.frequency:.2f} Hz, {m.damping:.3f}"
+                  for a, m in zip(ANGLES, pair, strict=True)),
+        "smallest step, lifting; frequencies more than 5 % apart", judged(differ),
+    )  # fmt: skip
+
+
+def _falling(direction: str, responses: list[Response], why: str) -> Number:
+    falls = all(b.mode.damping < a.mode.damping for a, b in pairwise(responses))
+    sizes = ", ".join(f"{r.size:g}" for r in responses)
+    return Number(
+        11, f"step responses: damping, {direction}", "falls with the step",
+        _dampings(responses), f"as above, y2 = {sizes}", judged(falls), "" if falls else why,
+    )  # fmt: skip
+
+
+def _dampings(responses: list[Response]) -> str:
+    return ", ".join(f"{r.mode.damping:.3f}" for r in responses)
+
+
+def _resolver(machine: Machine) -> Number:
+    s = machine.sensors
+    angles = FORTY_FIVE + np.linspace(0.0, 0.02, 2001)
+    shown = np.unique([resolver(float(a), s.resolver_bits, s.resolver_span) for a in angles])
+    step = float(np.diff(shown).min())
+    arm = float(linkage.lever_arm(FORTY_FIVE, Plant(machine).record[0]))
+    bits, tcp = math.log2(2.0 * math.pi / step), step * machine.geometry.boom_length
+    return Number(
+        12, "position resolver", "12 bit",
+        f"{bits:.2f} bit of a turn: {tcp * 1e3:.1f} mm at the TCP, {step * arm * 1e3:.2f} mm"
+        " of stroke", "steps of its reading about 45 deg", judged(math.isclose(bits, 12.0)),
+    )  # fmt: skip

@@ -1,0 +1,84 @@
+"""The paper's numbers beside ours, all of them measured when the table is made."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from emir_analysis import figure_steps, paper_numbers_control, paper_numbers_machine
+from emir_analysis.errors import InputError
+from emir_analysis.figure_steps import StepResponses
+from emir_analysis.paper_number import Number
+from emir_plant.parameters import Machine
+
+
+@dataclass(frozen=True)
+class Table:
+    """All numbers, and the slow mode of every step response."""
+
+    numbers: list[Number]
+    steps: StepResponses
+
+    def as_text(self) -> str:
+        """Return both tables in the form of Markdown."""
+        lines = [
+            "# The paper's numbers",
+            "",
+            "A number is met when ours rounds to it. Joint 1, boom stretched.",
+            "",
+            "| # | what | paper | ours | how it was measured | met |",
+            "| ---: | --- | --- | --- | --- | --- |",
+        ]
+        for n in self.numbers:
+            met = f"{n.met}: {n.reason}" if n.reason else n.met
+            lines.append(f"| {n.number} | {n.what} | {n.paper} | {n.ours} | {n.how} | {met} |")
+        lines += [
+            "",
+            "# Step responses of the valve",
+            "",
+            "Fitted to the tip's angular velocity: a decaying oscillation on a parabola of time.",
+            "rest: what that does not explain; closings: of the logic block; p_H: least, in bar.",
+            "",
+            figure_steps.as_text(self.steps),
+        ]
+        return "\n".join(lines) + "\n"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the same as plain values; SI units but for angles, which are in deg."""
+        steps = [
+            {
+                "machine": machine,
+                "angle": r.angle,
+                "direction": direction,
+                "y2": r.direction * r.size,
+                "logic_block_closes": r.interruptions,
+                "least_pressure_lifting": r.lowest,
+            }
+            | asdict(r.mode)
+            for machine, direction, r in figure_steps.rows(self.steps)
+        ]
+        return {"numbers": [asdict(n) for n in self.numbers], "step_responses": steps}
+
+
+def measure(machine: Machine, steps: StepResponses, progress: Callable[[str], None]) -> Table:
+    """Measure every number that the model can show."""
+    progress("table: the machine")
+    numbers = paper_numbers_machine.measure(machine, steps)
+    progress("table: its control")
+    numbers += paper_numbers_control.measure(machine)
+    return Table(sorted(numbers, key=lambda n: n.number), steps)
+
+
+def write(table: Table, folder: Path) -> list[Path]:
+    """Write table.md and table.json; return them. Raises InputError where that cannot be."""
+    texts = {
+        "table.md": table.as_text(),
+        "table.json": json.dumps(table.as_json(), indent=2, allow_nan=False) + "\n",
+    }
+    for name, text in texts.items():
+        try:
+            (folder / name).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{folder / name}: {error.strerror}") from None
+    return [folder / name for name in texts]

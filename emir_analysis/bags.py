@@ -14,6 +14,8 @@ from zstandard import ZstdError
 
 from emir_analysis.errors import InputError
 
+MAGIC = b"\x89MCAP0\r\n"  # first and last bytes of an .mcap file
+
 
 class _Stream:
     """A file that says so when it ends in the middle of a record."""
@@ -64,7 +66,7 @@ def metadata(path: Path) -> dict[str, dict[str, str]]:
     return {
         record.name: dict(record.metadata)
         for file in files(path)
-        for record in _records(file)
+        for record in records(file)
         if isinstance(record, Metadata)
     }
 
@@ -81,15 +83,46 @@ def files(path: Path) -> list[Path]:
 
 def recorded_topics(path: Path) -> set[str]:
     """Return the names of the topics in a recording. Raises InputError as `read`."""
-    records = (record for file in files(path) for record in _records(file))
-    return {record.topic for record in records if isinstance(record, Channel)}
+    found = (record for file in files(path) for record in records(file))
+    return {record.topic for record in found if isinstance(record, Channel)}
+
+
+def records(file: Path) -> Iterator[McapRecord]:
+    """Yield the records of a file in their order, up to where it was cut off.
+
+    Read in sequence and not by the index at the end, which a cut-off file does not have. Raises
+    InputError where the file is damaged.
+    """
+    try:
+        with file.open("rb") as stream:
+            for record in _sequence(stream):
+                yield record
+                if isinstance(record, Footer):
+                    return
+    except EndOfFile:
+        return
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
+    except (McapError, ZstdError, struct.error, ValueError, RuntimeError) as error:
+        raise InputError(f"{file}: damaged: {' '.join(str(error).split())}") from None
+
+
+def is_finished(file: Path) -> bool:
+    """Return whether an .mcap file was written to its end; what is cut off lacks the end's magic.
+
+    Raises InputError for a file that cannot be read.
+    """
+    try:
+        return file.read_bytes().endswith(MAGIC)
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
 
 
 def _messages(file: Path, topics: Collection[str] | None) -> Iterator[tuple[str, Message]]:
     factory = DecoderFactory()
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
-    for record in _records(file):
+    for record in records(file):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel):
@@ -130,22 +163,3 @@ def _header_stamp(data: Any, log_time: int) -> int:
 def _sequence(stream: IO[bytes]) -> Iterator[McapRecord]:
     reader = StreamReader(cast("IO[bytes]", _Stream(stream)), validate_crcs=True)
     yield from reader.records
-
-
-def _records(file: Path) -> Iterator[McapRecord]:
-    """Yield the records of a file in their order, up to where it was cut off.
-
-    Read in sequence and not by the index at the end, which a cut-off file does not have.
-    """
-    try:
-        with file.open("rb") as stream:
-            for record in _sequence(stream):
-                yield record
-                if isinstance(record, Footer):
-                    return
-    except EndOfFile:
-        return
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
-    except (McapError, ZstdError, struct.error, ValueError, RuntimeError) as error:
-        raise InputError(f"{file}: damaged: {' '.join(str(error).split())}") from None

@@ -13,6 +13,8 @@ from emir_common.quantity import ParameterError
 USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
+  info       what is in a recording, and whether it was finished
+  bag        recover a recording that was cut off
   analyze    figures and pictures of a recording of the graph
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
@@ -27,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
+        "info": _info,
+        "bag": _bag,
         "analyze": _analyze,
         "compare": _compare,
         "design": _design,
@@ -62,6 +66,32 @@ def _run(words: list[str]) -> int:
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
     os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
+
+
+def _info(words: list[str]) -> int:
+    from emir_analysis.info import info, text
+
+    parser = argparse.ArgumentParser(prog="emir info")
+    parser.add_argument("bag", type=Path, help="any recording in MCAP")
+    print(text(info(parser.parse_args(words).bag)))
+    return 0
+
+
+def _bag(words: list[str]) -> int:
+    from emir_analysis.recover import recover
+
+    parser = argparse.ArgumentParser(prog="emir bag")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    about = "a complete recording from one that was cut off"
+    recovery = commands.add_parser("recover", help=about, description=about)
+    recovery.add_argument("bag", type=Path, help="folder or .mcap file")
+    recovery.add_argument("--out", type=Path, required=True, metavar="DIR", help="must not exist")
+    options = parser.parse_args(words)
+    saved = recover(options.bag, options.out)
+    for line in saved.damage:
+        _progress(f"emir bag: {line}; what came before it is saved")
+    print(f"{options.out}: {saved.messages} messages over {saved.duration_ns * 1e-9:.3f} s")
+    return 0
 
 
 def _analyze(words: list[str]) -> int:

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
+from mcap.records import Schema
 
 SEPARATOR = "=" * 80
 BUILTIN = re.compile(r"(bool|byte|char|u?int(8|16|32|64)|float(32|64)|w?string)\b")
@@ -27,6 +28,11 @@ def definition(type_name: str) -> str:
                 seen.append(found)
                 parts.append(f"{SEPARATOR}\nMSG: {found[0]}/{found[1]}\n{_text(*found)}")
     return "\n".join(parts)
+
+
+def schema(type_name: str) -> Schema:
+    """Return a type's definition as an MCAP file holds it, id 0."""
+    return Schema(0, definition(type_name).encode(), "ros2msg", type_name)
 
 
 @cache

@@ -13,6 +13,7 @@ from typing import Any
 
 from std_msgs.msg import Header
 
+from emir_analysis.rosbag2_writer import Rosbag2Writer, channel_metadata
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
@@ -25,8 +26,8 @@ from emir_msgs_py.topics import (
 )
 from emir_ros import qos
 from emir_ros.main import run
+from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
-from emir_ros.rosbag2_writer import Rosbag2Writer
 from emir_ros.shell import Shell
 
 CDR_STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
@@ -67,7 +68,8 @@ class RecorderNode(Shell):
     def _record(self, topic: Topic) -> None:
         full_name = self.resolve_topic_name(topic.name)
         profile = qos.offered(lockstep=self.lockstep)
-        self._writer.add_topic(full_name, topic.type, [qos.as_rosbag2(profile)])
+        offered = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
+        self._writer.add_topic(full_name, schema(topic.type), offered)
 
         def receive(data: bytes) -> None:
             sec, nanosec = CDR_STAMP.unpack_from(data)

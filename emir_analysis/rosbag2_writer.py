@@ -7,11 +7,11 @@ from types import TracebackType
 from typing import Any, Self
 
 import yaml
+from mcap.records import Attachment, Schema
 from mcap.writer import CompressionType, Writer
 
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
-from emir_ros.message_definitions import definition, type_hash
 
 CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose
 
@@ -27,13 +27,18 @@ def _yaml(content: Any) -> str:
     return yaml.dump(content, Dumper=_Plain, sort_keys=False)
 
 
+def channel_metadata(qos: list[dict[str, Any]], type_hash: str) -> dict[str, str]:
+    """Return what rosbag2 stores with a channel: the QoS offered and the type's RIHS01 hash."""
+    return {"offered_qos_profiles": _yaml(qos), "topic_type_hash": type_hash}
+
+
 @dataclass
 class Channel:
     """A topic of the recording."""
 
     topic: str
     type: str
-    qos: list[dict[str, Any]]
+    metadata: dict[str, str]  # of rosbag2: QoS as YAML, type hash
     id: int
     count: int = 0
 
@@ -73,6 +78,11 @@ class Rosbag2Writer:
         self.close()
 
     @property
+    def topics(self) -> set[str]:
+        """Return the full names of the topics announced."""
+        return set(self._channels)
+
+    @property
     def message_count(self) -> int:
         """Return how many messages were written."""
         return sum(channel.count for channel in self._channels.values())
@@ -82,26 +92,31 @@ class Rosbag2Writer:
         """Return the time between first and last message, ns."""
         return 0 if self._start is None else self._end - self._start
 
-    def add_topic(self, topic: str, type_name: str, qos: list[dict[str, Any]]) -> None:
-        """Announce a topic by its full name, with the QoS that its publishers offer."""
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._writer.register_schema(
-                name=type_name, encoding="ros2msg", data=definition(type_name).encode()
+    def add_topic(self, topic: str, schema: Schema, metadata: dict[str, str]) -> None:
+        """Announce a topic by its full name.
+
+        schema: name, encoding and text of the type; its id is not used. metadata: as
+        `channel_metadata` returns it, or as it stands in another recording.
+        """
+        if schema.name not in self._schemas:
+            self._schemas[schema.name] = self._writer.register_schema(
+                name=schema.name, encoding=schema.encoding, data=schema.data
             )
         channel = self._writer.register_channel(
             topic=topic,
             message_encoding="cdr",
-            schema_id=self._schemas[type_name],
-            metadata={
-                "offered_qos_profiles": _yaml(qos),
-                "topic_type_hash": type_hash(type_name),
-            },
+            schema_id=self._schemas[schema.name],
+            metadata=metadata,
         )
-        self._channels[topic] = Channel(topic, type_name, qos, channel)
+        self._channels[topic] = Channel(topic, schema.name, metadata, channel)
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Store a metadata record, texts by key, in the MCAP file."""
         self._writer.add_metadata(name, data)
+
+    def add_attachment(self, a: Attachment) -> None:
+        """Store an attachment in the MCAP file."""
+        self._writer.add_attachment(a.create_time, a.log_time, a.name, a.media_type, a.data)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """Store one message; times in ns."""
@@ -120,7 +135,7 @@ class Rosbag2Writer:
             return
         text = _yaml(self._metadata())
         self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's, untyped
         self._stream.close()
         (self.folder / "metadata.yaml").write_text(text)
         if not self.message_count:
@@ -135,8 +150,8 @@ class Rosbag2Writer:
                     "name": channel.topic,
                     "type": channel.type,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": channel.qos,
-                    "type_description_hash": type_hash(channel.type),
+                    "offered_qos_profiles": _qos(channel),
+                    "type_description_hash": channel.metadata.get("topic_type_hash", ""),
                 },
                 "message_count": channel.count,
             }
@@ -165,3 +180,7 @@ class Rosbag2Writer:
                 "ros_distro": "jazzy",
             }
         }
+
+
+def _qos(channel: Channel) -> list[dict[str, Any]]:
+    return yaml.safe_load(channel.metadata.get("offered_qos_profiles", "")) or []

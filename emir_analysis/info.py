@@ -1,0 +1,98 @@
+"""What a recording says of itself, and what is in it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.records import Channel, Message, Metadata, Schema
+
+from emir_analysis import bags
+
+DESCRIPTION = "emir"  # the metadata record in which the graph describes its run
+
+
+@dataclass
+class TopicInfo:
+    """A recorded topic. first, last: log times, ns."""
+
+    type: str
+    count: int = 0
+    first: int = 0
+    last: int = 0
+
+    @property
+    def rate(self) -> float | None:
+        """Return messages per second between the first and the last, Hz; None for too few."""
+        span = self.last - self.first
+        return (self.count - 1) / (span * 1e-9) if span > 0 else None
+
+    def add(self, time: int) -> None:
+        """Count a message with its log time, ns."""
+        self.first = min(self.first, time) if self.count else time
+        self.last = max(self.last, time) if self.count else time
+        self.count += 1
+
+
+@dataclass(frozen=True)
+class Info:
+    """about: the run's own description. unfinished: the files that were cut off."""
+
+    bag: Path
+    about: dict[str, str]
+    topics: dict[str, TopicInfo]
+    unfinished: list[Path] = field(default_factory=list)
+
+    @property
+    def duration(self) -> float:
+        """Return the time between the first and the last message, s."""
+        filled = [topic for topic in self.topics.values() if topic.count]
+        if not filled:
+            return 0.0
+        return (max(t.last for t in filled) - min(t.first for t in filled)) * 1e-9
+
+
+def info(bag: Path) -> Info:
+    """Count what is in a recording. Raises InputError as `bags.read`."""
+    found = Info(bag, {}, {})
+    for file in bags.files(bag):
+        _count(file, found)
+        if not bags.is_finished(file):
+            found.unfinished.append(file)
+    return found
+
+
+def _count(file: Path, found: Info) -> None:
+    types: dict[int, str] = {}
+    topics: dict[int, TopicInfo] = {}
+    for record in bags.records(file):
+        if isinstance(record, Schema):
+            types[record.id] = record.name
+        elif isinstance(record, Channel):
+            kind = types.get(record.schema_id, "unknown type")
+            topics[record.id] = found.topics.setdefault(record.topic, TopicInfo(kind))
+        elif isinstance(record, Message) and record.channel_id in topics:
+            topics[record.channel_id].add(record.log_time)
+        elif isinstance(record, Metadata) and record.name == DESCRIPTION:
+            found.about.update(record.metadata)
+
+
+def text(found: Info) -> str:
+    """Return what is known as lines of text."""
+    messages = sum(topic.count for topic in found.topics.values())
+    lines = [f"{key}: {value}" for key, value in found.about.items() if key != "duration"]
+    lines.append(f"recorded: {found.duration:.3f} s, {messages} messages")
+    lines.append(f"file: {_state(found)}")
+    wide = max(map(len, found.topics), default=0)
+    kinds = max((len(topic.type) for topic in found.topics.values()), default=0)
+    for name, topic in sorted(found.topics.items()):
+        rate = "-" if topic.rate is None else f"{topic.rate:.2f}"
+        lines.append(f"  {name:{wide}}  {topic.type:{kinds}}  {topic.count:>8} {rate:>9} Hz")
+    return "\n".join([f"{found.bag}:", *lines])
+
+
+def _state(found: Info) -> str:
+    if found.unfinished:
+        names = ", ".join(file.name for file in found.unfinished)
+        return f"cut off ({names}); emir bag recover makes it whole"
+    if found.bag.is_dir() and not (found.bag / "metadata.yaml").exists():
+        return "finished, but metadata.yaml is missing; emir bag recover makes it whole"
+    return "finished"

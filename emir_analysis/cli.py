@@ -15,6 +15,7 @@ USAGE = """usage: emir COMMAND ...
   run        run the graph of machine and controllers, record it, show its figures
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
+  replay     a recording's inputs to its controller: does it give what was recorded?
   analyze    figures and pictures of a recording of the graph
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
@@ -31,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "run": _run,
         "info": _info,
         "bag": _bag,
+        "replay": _replay,
         "analyze": _analyze,
         "compare": _compare,
         "design": _design,
@@ -92,6 +94,33 @@ def _bag(words: list[str]) -> int:
         _progress(f"emir bag: {line}; what came before it is saved")
     print(f"{options.out}: {saved.messages} messages over {saved.duration_ns * 1e-9:.3f} s")
     return 0
+
+
+def _replay(words: list[str]) -> int:
+    import yaml
+
+    from emir_analysis.replay import NODES, replay, same, text
+
+    parser = argparse.ArgumentParser(prog="emir replay")
+    parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
+    parser.add_argument("--node", required=True, metavar="NAME", help=", ".join(NODES))
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PARAM=VALUE",
+        help="show what this would have changed, open loop; may be repeated",
+    )  # fmt: skip
+    options = parser.parse_args(words)
+    changed = {}
+    for entry in options.set:
+        name, equals, value = entry.partition("=")
+        if not equals:
+            raise InputError(f"--set {entry}: not of the form PARAM=VALUE")
+        try:
+            changed[name] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            raise InputError(f"--set {entry}: {value} is not a value") from None
+    fields = replay(options.bag, options.node, changed)
+    print(text(fields, changed))
+    return 0 if changed or same(fields) else 1
 
 
 def _analyze(words: list[str]) -> int:

@@ -32,7 +32,7 @@ def load_run(path: Path) -> Recording:
     there = bags.recorded_topics(path)
     sources: dict[str, Source] = {}
     for topic in (*NEEDED, *OPTIONAL):
-        name = _full_name(topic, there)
+        name = full_name(topic, there)
         if name is not None:
             fields = topic.fields.items()
             sources |= {signal: Source(name, about.path, about.unit) for signal, about in fields}
@@ -41,7 +41,7 @@ def load_run(path: Path) -> Recording:
     return load(path, sources)
 
 
-def _full_name(topic: Topic, there: set[str]) -> str | None:
+def full_name(topic: Topic, there: set[str]) -> str | None:
     """Return the recorded topic with that relative name, whatever its namespace."""
     found = [name for name in there if name.endswith(f"/{topic.name}")]
     return min(found, key=len) if found else None

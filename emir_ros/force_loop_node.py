@@ -1,27 +1,14 @@
 """force_loop_node: force feedback and static prefilter, from wanted velocity to valve current."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from emir_control.force_loop import (
-    ForceLoop,
-    ForceLoopInputs,
-    ForceLoopOutputs,
-    ForceLoopParameters,
-    ForceLoopState,
-)
-from emir_msgs_py.topics import (
-    FORCE_LOOP_TERMS,
-    JOINT_STATES,
-    PRESSURE_LIFTING,
-    PRESSURE_LOWERING,
-    VALVE_COMMAND,
-    VELOCITY_COMMAND,
-)
+from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
+from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
 
-INPUTS = [VELOCITY_COMMAND, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING]
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
 
 
@@ -32,38 +19,22 @@ class ForceLoopNode(ControlNode):
     """
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("force_loop_node", INPUTS, [FORCE_LOOP_TERMS, VALVE_COMMAND], arguments)
-        self.force_loop = ForceLoop(declare_tree(self, ForceLoopParameters()))
-        self.state: ForceLoopState | None = None
+        super().__init__(
+            "force_loop_node", ForceLoopControl.inputs, ForceLoopControl.outputs, arguments
+        )
+        self.law = ForceLoopControl(ForceLoop(declare_tree(self, ForceLoopParameters())))
+        self.state: Any = None
         reject_unknown(self)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return command and terms of this control period."""
-        inputs = ForceLoopInputs(
-            signals["velocity_command"],
-            0.0,
-            signals["angle"],
-            signals["pressure_lifting"],
-            signals["pressure_lowering"],
-        )
-        state = self.state or self.force_loop.initial(inputs)
-        self.state, outputs = self.force_loop.step(state, inputs, dt)
-        return _signals(outputs)
+        self.state, outputs = self.law.step(self.state, signals, dt)
+        return outputs
 
     def stale(self, missing: Sequence[str]) -> Signals:
         """Return the command that shuts the valve; the damping starts anew afterwards."""
         self.state = None
-        return _signals(SHUT)
-
-
-def _signals(outputs: ForceLoopOutputs) -> Signals:
-    return {
-        "valve_command": outputs.valve_command,
-        "measured_force": outputs.force,
-        "force_feedback": outputs.feedback,
-        "wanted_velocity": outputs.velocity,
-        "saturated": float(outputs.saturated),
-    }
+        return force_loop_signals(SHUT)
 
 
 def main() -> None:

@@ -23,6 +23,7 @@ from rosbags.interfaces import QosReliability
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
+from emir_analysis.replay import replay, same
 from emir_analysis.rosbag2_writer import Rosbag2Writer
 from emir_control import pfc_file
 from emir_control.pfc import Pfc
@@ -94,6 +95,8 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert finished.returncode == 0, finished.stderr
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
+    for node in ("trajectory", controller, "force_loop"):
+        assert same(replay(bag, node, {})), node
 
 
 def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:

@@ -1,0 +1,153 @@
+"""What each control node computes, by the signals of the topic table and without ROS.
+
+The nodes of the graph and the replay of a recording both hold these objects.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from emir_analysis.outer_loop import pfc_signals
+from emir_control.cascade import Cascade, CascadeInputs
+from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
+from emir_control.pfc import Pfc, PfcInputs
+from emir_control.tip import Tip, TipInputs
+from emir_control.trajectory import AwayAndBack, Reference, TrajectoryInputs
+from emir_msgs_py.topics import (
+    BOOM_DEFLECTION,
+    CASCADE_TERMS,
+    CYLINDER_PREVIEW,
+    CYLINDER_REFERENCE,
+    CYLINDER_STATES,
+    FORCE_LOOP_TERMS,
+    JOINT_STATES,
+    PFC_TERMS,
+    PFC_TIP_TERMS,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    VALVE_COMMAND,
+    VELOCITY_COMMAND,
+    Topic,
+)
+
+Signals = dict[str, float]
+Topics = tuple[Topic, ...]
+
+
+class NodeControl(Protocol):
+    """From the signals of the inputs to those of the outputs."""
+
+    inputs: ClassVar[Topics]
+    outputs: ClassVar[Topics]
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the outputs of one period of dt, s; None: begin here."""
+
+
+@dataclass(frozen=True)
+class TrajectoryControl:
+    """trajectory_node: the desired piston motion."""
+
+    inputs: ClassVar[Topics] = (CYLINDER_STATES,)
+    outputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW)
+    trajectory: AwayAndBack
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the reference of this period and of the next ones."""
+        inputs = TrajectoryInputs(signals["stroke"])
+        state = state or self.trajectory.initial(inputs)
+        ahead = self.trajectory.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
+        state, now = self.trajectory.step(state, inputs, dt)
+        reference = {"reference_stroke": now.stroke, "reference_velocity": now.velocity}
+        return state, reference | dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
+
+
+@dataclass(frozen=True)
+class CascadeControl:
+    """cascade_node: law (11)."""
+
+    inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (CASCADE_TERMS, VELOCITY_COMMAND)
+    cascade: Cascade
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        inputs = CascadeInputs(_reference(signals), signals["stroke"])
+        state, outputs = self.cascade.step(state or self.cascade.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
+
+
+@dataclass(frozen=True)
+class PfcControl:
+    """pfc_node: law (12)."""
+
+    inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW, CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (PFC_TERMS, VELOCITY_COMMAND)
+    pfc: Pfc
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        wanted = _reference(signals)
+        stroke = signals["stroke"]
+        inputs = PfcInputs(wanted.stroke, wanted.velocity, _preview(signals), stroke)
+        state, outputs = self.pfc.step(state or self.pfc.initial(inputs), inputs, dt)
+        return state, pfc_signals("pfc", outputs)
+
+
+@dataclass(frozen=True)
+class PfcTipControl:
+    """pfc_tip_node: the TCP's angle alpha_6 (paper 3.3)."""
+
+    inputs: ClassVar[Topics] = (
+        CYLINDER_REFERENCE, CYLINDER_PREVIEW, JOINT_STATES, BOOM_DEFLECTION,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (PFC_TIP_TERMS, VELOCITY_COMMAND)
+    tip: Tip
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        measured = signals["angle"], signals["deflection"]
+        inputs = TipInputs(_reference(signals), _preview(signals), *measured)
+        state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
+        return state, pfc_signals("pfc_tip", outputs)
+
+
+@dataclass(frozen=True)
+class ForceLoopControl:
+    """force_loop_node: force feedback and prefilter (paper 3.1)."""
+
+    inputs: ClassVar[Topics] = (
+        VELOCITY_COMMAND, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (FORCE_LOOP_TERMS, VALVE_COMMAND)
+    force_loop: ForceLoop
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        inputs = ForceLoopInputs(
+            signals["velocity_command"],
+            0.0,
+            signals["angle"],
+            signals["pressure_lifting"],
+            signals["pressure_lowering"],
+        )
+        state, outputs = self.force_loop.step(state or self.force_loop.initial(inputs), inputs, dt)
+        return state, force_loop_signals(outputs)
+
+
+def force_loop_signals(outputs: ForceLoopOutputs) -> Signals:
+    """Return command and terms by the names of the topic table."""
+    return {
+        "valve_command": outputs.valve_command,
+        "measured_force": outputs.force,
+        "force_feedback": outputs.feedback,
+        "wanted_velocity": outputs.velocity,
+        "saturated": float(outputs.saturated),
+    }
+
+
+def _reference(signals: Signals) -> Reference:
+    return Reference(signals["reference_stroke"], signals["reference_velocity"])
+
+
+def _preview(signals: Signals) -> list[float]:
+    return [signals[name] for name in CYLINDER_PREVIEW.fields]

@@ -1,0 +1,80 @@
+"""A recording in lock step replays bit for bit; what was not recorded so does not."""
+
+import json
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Schema
+
+from emir_analysis.cli import main
+from emir_analysis.replay import replay, same
+from emir_analysis.rosbag2_writer import Rosbag2Writer
+
+OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"
+
+
+def _copy(folder: Path, about: dict[str, str]) -> Path:
+    """The project's own recording with another description."""
+    with next(OWN_BAG.glob("*.mcap")).open("rb") as stream, Rosbag2Writer(folder) as writer:
+        writer.add_metadata("emir", about)
+        for schema, channel, message in make_reader(stream).iter_messages():
+            assert isinstance(schema, Schema)
+            if channel.topic not in writer.topics:
+                writer.add_topic(channel.topic, schema, channel.metadata)
+            writer.write(channel.topic, message.data, message.log_time, message.publish_time)
+    return folder
+
+
+@pytest.mark.parametrize("node", ["trajectory", "cascade", "force_loop"])
+def test_a_lockstep_recording_replays_bit_for_bit(node: str) -> None:
+    fields = replay(OWN_BAG, node, {})
+    assert same(fields)
+    assert sum(field.recorded.size for field in fields) >= 2 * 101  # 3.2 s / 32 ms and the first
+    assert main(["replay", str(OWN_BAG), "--node", node]) == 0
+
+
+def test_another_gain_answers_in_proportion(capsys: pytest.CaptureFixture[str]) -> None:
+    """Half the gain is half the feedback of law (11), the feedforward stays as it is."""
+    fields = {field.name: field for field in replay(OWN_BAG, "cascade", {"gain": 1.0})}
+    feedback = fields["feedback"]
+    assert feedback.replayed == pytest.approx(feedback.recorded / 2.0, rel=1e-12)
+    assert feedback.largest_difference > 1e-3
+    assert fields["feedforward"].equal == fields["feedforward"].recorded.size
+    assert main(["replay", str(OWN_BAG), "--node", "cascade", "--set", "gain=1.0"]) == 0
+    assert "open loop: the machine does not answer" in capsys.readouterr().out
+
+
+def test_parameters_of_the_run_are_those_of_the_recording(tmp_path: Path) -> None:
+    """A recording that claims another gain than it was made with does not replay."""
+    parameters = {"cascade_node": {"gain": 1.0}, "/**": {"lockstep": True}}
+    bag = _copy(tmp_path / "bag", {"parameters": json.dumps(parameters)})
+    assert main(["replay", str(bag), "--node", "cascade"]) == 1
+    assert main(["replay", str(bag), "--node", "force_loop"]) == 0
+    assert same(replay(bag, "cascade", {"gain": 2.0}))
+
+
+BAD = {
+    "node": (["--node", "magic"], "--node magic: there are trajectory"),
+    "topic": (["--node", "pfc"], "no topic cylinder_preview"),
+    "parameter": (["--node", "cascade", "--set", "gan=1"], "cascade: gan: there is no such"),
+    "range": (["--node", "cascade", "--set", "gain=-1"], "cascade: gain = -1: outside"),
+    "type": (["--node", "cascade", "--set", "gain=high"], "cascade: gain = 'high': not a number"),
+    "form": (["--node", "cascade", "--set", "gain"], "--set gain: not of the form PARAM=VALUE"),
+    "yaml": (["--node", "cascade", "--set", "gain=["], "--set gain=[: [ is not a value"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_clear_line(case: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words, said = BAD[case]
+    assert main(["replay", str(OWN_BAG), *words]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert len(told.splitlines()) == 1
+
+
+def test_a_broken_description_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = _copy(tmp_path / "bag", {"parameters": "[1, 2"})
+    assert main(["replay", str(bag), "--node", "cascade"]) == 1
+    assert "parameters: not JSON of nodes" in capsys.readouterr().err

@@ -46,8 +46,11 @@ setup(
         "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
         # The whole robot's mechanics; the main joint does without.
         "robot": ["pin>=4.1"],
+        # The blind test on the machines of a Dask cluster.
+        "cluster": ["distributed>=2024.8"],
         "test": [
             "control>=0.10",
+            "distributed>=2024.8",
             "mujoco>=3.2",
             "pytest>=8.2",
             "pytest-timeout>=2.3",

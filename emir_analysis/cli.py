@@ -21,6 +21,7 @@ USAGE = """usage: emir COMMAND ...
   design     a predictive controller for a machine, and where it is stable
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  blind      machines with something hidden in them: does the diagnosis find it?
 
 `emir COMMAND --help` tells more."""
 
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "design": _design,
         "figures": _figures,
         "diagnose": _diagnose,
+        "blind": _blind,
     }
     if not words or words[0] in ("-h", "--help"):
         print(USAGE)
@@ -225,6 +227,13 @@ def _diagnose(words: list[str]) -> int:
     o = parser.parse_args(words)
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
+    return 0
+
+
+def _blind(words: list[str]) -> int:
+    from emir_analysis.blind.command import arguments, command
+
+    print(command(arguments(words), _progress))
     return 0
 
 

@@ -3,7 +3,8 @@
 An entry is `name: {value, unit, source, tol}`. `tol` is the maker's relative tolerance; an
 entry with a tolerance and no value stands for a factor of 1. Entries may be grouped as a map
 of plain numbers (`resolver: {bits: 12, span: 1.57}` means resolver_bits, resolver_span).
-Effects are switched on by name: `effects: {coulomb_friction: {force: 3.0e+3}}`.
+Effects are switched on by name: `effects: {coulomb_friction: {force: 3.0e+3}}`. A file may state
+only what differs from another one beside it: `based_on: joint1.yaml`.
 """
 
 import dataclasses
@@ -17,6 +18,7 @@ from emir_common.yaml_file import read_map
 from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
 
+BASED_ON = "based_on"
 EFFECTS = "effects."  # in front of an effect's name in a dotted path
 
 
@@ -35,7 +37,17 @@ class Sheet:
 
 def joint1() -> Machine:
     """Return EMIR's main joint as the project states it (data/joint1.yaml)."""
-    return load_sheet(Path(str(files("emir_plant") / "data" / "joint1.yaml")), strict=True).machine
+    return load_sheet(data("joint1.yaml"), strict=True).machine
+
+
+def even_edges() -> Machine:
+    """Return it with the valve that steps as paper Fig. 7 says (data/joint1_even_edges.yaml)."""
+    return load_sheet(data("joint1_even_edges.yaml"), strict=True).machine
+
+
+def data(name: str) -> Path:
+    """Return a file that comes with the project."""
+    return Path(str(files("emir_plant") / "data" / name))
 
 
 def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
@@ -45,10 +57,33 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     that cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
     content = read_map(path, what="parameters")
+    base = content.pop(BASED_ON, None)
+    if base is not None:
+        content = _over(_base(path, base), content)
     try:
         return _sheet(content, strict=strict)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
+
+
+def _base(path: Path, name: Any) -> dict[str, Any]:
+    file = path.parent / str(name)
+    content = read_map(file, what="parameters")
+    if BASED_ON in content:
+        raise ParameterError(f"{path}: {BASED_ON}: {file} is itself based on another")
+    return content
+
+
+def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of both, a map's own entries prevailing over the base's."""
+    merged = dict(base)
+    for name, entry in own.items():
+        below = base.get(name)
+        if isinstance(below, dict) and isinstance(entry, dict) and "value" not in entry:
+            merged[name] = _over(below, entry)
+        else:
+            merged[name] = entry
+    return merged
 
 
 def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:

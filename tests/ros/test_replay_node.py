@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -34,10 +35,18 @@ class Listener(Node):
         super().__init__("listener")
         self.heard: list[bytes] = []
         self.clock: list[int] = []
+        self.matched = False
         profile = qos.offered(lockstep=True)
-        self.create_subscription(JointState, topic, self.heard.append, profile, raw=True)
+        profile.depth = 1000  # all of the recording, however slowly it is taken
+        self.create_subscription(
+            JointState, topic, self.heard.append, profile, raw=True,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._on_match),
+        )  # fmt: skip
         self.create_subscription(Clock, "/clock", self._on_clock, 100)
         self.pause = self.create_client(SetBool, "replay_node/pause")
+
+    def _on_match(self, _: object) -> None:
+        self.matched = True
 
     def _on_clock(self, message: Clock) -> None:
         self.clock.append(message.clock.sec * 1_000_000_000 + message.clock.nanosec)
@@ -76,8 +85,8 @@ def _spin(nodes: list[Any], until: Callable[[], object]) -> None:
 @pytest.mark.usefixtures("ros")
 def test_every_message_arrives_as_it_was_recorded() -> None:
     recorded = _recorded()
-    listener, node = Listener(), _replay("rate:=20.0", "start_paused:=true")
-    _spin([listener, node], lambda: node.count_subscribers(TOPIC) and listener.clock)
+    listener, node = Listener(), _replay("rate:=5.0", "start_paused:=true")
+    _spin([listener, node], lambda: listener.matched and listener.clock)
     listener.pause.call_async(SetBool.Request(data=False))
     _spin(
         [listener, node],

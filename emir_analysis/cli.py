@@ -110,7 +110,8 @@ def _bag(words: list[str]) -> int:
 def _replay(words: list[str]) -> int:
     import yaml
 
-    from emir_analysis.replay import NODES, replay, same, text
+    from emir_analysis.replay import NODES, replay, text
+    from emir_analysis.stamped import same
 
     parser = argparse.ArgumentParser(prog="emir replay")
     parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")

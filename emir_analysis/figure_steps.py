@@ -54,6 +54,11 @@ class Without:
     direction: int
     changes: dict[str, float]
 
+    @property
+    def name(self) -> str:
+        """Return the machine's name."""
+        return f"{EVEN} but {self.what}"
+
 
 NARROW_RETURN = Without(
     "return edge of 30 bar", LIFTING, {"resistances.k_meter_out_lifting": 1.12546875e12}
@@ -120,8 +125,7 @@ def step_responses(machine: Machine) -> StepResponses:
     found = {EVEN: [response(machine, a, d, s) for a in ANGLES for d in both for s in SIZES]}
     for lacking in WITHOUT:
         other = with_values(machine, lacking.changes)
-        name = f"{EVEN} but {lacking.what}"
-        found[name] = [response(other, ANGLES[0], lacking.direction, s) for s in SIZES]
+        found[lacking.name] = [response(other, ANGLES[0], lacking.direction, s) for s in SIZES]
     found[STANDARD] = [response(joint1(), ANGLES[0], d, s) for d in both for s in SIZES]
     return StepResponses(found)
 
@@ -190,9 +194,12 @@ def rows(found: StepResponses) -> list[tuple[str, Response]]:
 
 def as_text(found: StepResponses) -> str:
     """Return the slow mode of every response as a table, in the form of Markdown."""
+    heads = (
+        "machine", "from / deg", "direction", "y2", "f / Hz", "damping", "linear", "rest",
+        "closings", "least flow", "p_H / bar",
+    )  # fmt: skip
     lines = [
-        "| machine | from / deg | direction | y2 | f / Hz | damping | linear | rest | closings"
-        " | least flow | p_H / bar |",
+        f"| {' | '.join(heads)} |",
         "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for machine, r in rows(found):
@@ -218,7 +225,7 @@ def picture(found: StepResponses) -> Figure:
             _draw(axes, found.of(angle, direction), title)
     for axes, lacking in zip(diagrams[len(ANGLES) :].flat, WITHOUT, strict=False):
         title = f"{NAMES[lacking.direction]}, but {lacking.what}"
-        _draw(axes, found.by_machine[f"{EVEN} but {lacking.what}"], title)
+        _draw(axes, found.by_machine[lacking.name], title)
     for axes in diagrams[:, 0]:
         axes.set_ylabel("tip's angular velocity / deg/s")
     for axes in diagrams[-1]:

@@ -8,6 +8,7 @@ only what differs from another one beside it: `based_on: joint1.yaml`.
 """
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +20,7 @@ from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
 
 BASED_ON = "based_on"
+MORE_TOLD = "sensors."  # where a data sheet may tell more, such as the recording's rate
 EFFECTS = "effects."  # in front of an effect's name in a dotted path
 
 
@@ -53,8 +55,9 @@ def data(name: str) -> Path:
 def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     """Read a machine from YAML.
 
-    strict: every key has to be known. Raises ParameterError, naming file and key, for a file
-    that cannot be read, a missing or unknown key, another unit, a value outside its range.
+    strict: every key has to be known; else a data sheet may tell more about its sensors and have
+    headings. Raises ParameterError, naming file and key and what is allowed, for a file that
+    cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
     content = read_map(path, what="parameters")
     base = content.pop(BASED_ON, None)
@@ -99,10 +102,11 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         for g, kind in kinds.items()
         for name, about in quantities(kind).items()
     }
+    headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
     unknown = tuple(path for path in entries if path not in known)
-    wrong = unknown if strict else [path for path in unknown if path.startswith(EFFECTS)]
-    if wrong:
-        raise ParameterError(f"{wrong[0]}: there is no such parameter")
+    wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
+    for path in [*wrong, *(headings if strict else [])]:
+        raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
     values: dict[str, float] = {}
     for path, about in known.items():
         entry = entries.get(path)
@@ -122,6 +126,14 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     )
 
 
+def _there_are(path: str, known: Iterable[str]) -> str:
+    """Return a list of what stands in the same group, or of the groups."""
+    group = path.rpartition(".")[0]
+    names = [name.rpartition(".") for name in known]
+    inside = [name for where, _, name in names if where == group]
+    return f"there are {', '.join(inside or dict.fromkeys(where for where, _, _ in names))}"
+
+
 def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the groups of parameters in a file by dotted path, each effect being one.
 
@@ -132,7 +144,9 @@ def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
         raise ParameterError(f"effects = {effects!r}: not a map of effects by name")
     for name, members in effects.items():
         if name not in REGISTRY:
-            raise ParameterError(f"effects.{name}: there is no such effect")
+            raise ParameterError(
+                f"effects.{name}: there is no such effect; there are {', '.join(REGISTRY)}"
+            )
         if not isinstance(members, dict):
             raise ParameterError(f"effects.{name} = {members!r}: not a map of its parameters")
     others = {name: group for name, group in content.items() if isinstance(group, dict)}
@@ -168,5 +182,7 @@ def _group(kind: type[Any], name: str, values: dict[str, float]) -> Any:
     given = {f.name: values[f"{name}.{f.name}"] for f in fields if f"{name}.{f.name}" in values}
     for f in fields:
         if f.name not in given and f.default is dataclasses.MISSING:
-            raise ParameterError(f"{name}.{f.name}: missing")
+            raise ParameterError(
+                f"{name}.{f.name}: missing; allowed is {f.metadata['quantity'].allowed}"
+            )
     return kind(**given)

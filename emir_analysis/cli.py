@@ -22,6 +22,7 @@ USAGE = """usage: emir COMMAND ...
   design     a predictive controller for a machine, and where it is stable
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
 
@@ -40,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "design": _design,
         "figures": _figures,
         "diagnose": _diagnose,
+        "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
         print(USAGE)
@@ -63,13 +65,18 @@ def _complain(who: str, message: str) -> int:
 
 
 def _run(words: list[str]) -> int:
+    """Run the graph."""
+    return _hand_over("emir_ros.run", words)
+
+
+def _hand_over(module: str, words: list[str]) -> int:
     """Hand over to the one package that knows ROS, in this same process.
 
     -P: what lies in the current folder is not imported.
     """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", module, *words])  # noqa: S606
 
 
 def _import(words: list[str]) -> int:
@@ -216,6 +223,22 @@ def _design(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _bench(words: list[str]) -> int:
+    if words[:1] == ["graph"]:
+        return _hand_over("emir_ros.bench", words[1:])
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
+    from emir_analysis.bench.command import PARTS, command
+
+    parser = argparse.ArgumentParser(prog="emir bench")
+    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    command(parser.parse_args(words), print)
     return 0
 
 

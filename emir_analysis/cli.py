@@ -13,6 +13,7 @@ from emir_common.quantity import ParameterError
 USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
+  import     a CSV file as a recording, by a signal map
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
@@ -31,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
+        "import": _import,
         "info": _info,
         "bag": _bag,
         "replay": _replay,
@@ -75,6 +77,28 @@ def _hand_over(module: str, words: list[str]) -> int:
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
     os.execv(sys.executable, [sys.executable, "-P", "-m", module, *words])  # noqa: S606
+
+
+def _import(words: list[str]) -> int:
+    from emir_analysis.import_command import import_csv
+
+    parser = argparse.ArgumentParser(prog="emir import")
+    parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
+    parser.add_argument(
+        "--signals", type=Path, required=True, help="YAML: signal, column, topic, field, unit"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="BAG", help="must not exist")
+    parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
+    o = parser.parse_args(words)
+    try:
+        rows = (
+            None if o.rows is None else slice(*(int(n) if n else None for n in o.rows.split(":")))
+        )
+    except (TypeError, ValueError):
+        raise InputError(f"--rows {o.rows}: not of the form A:B") from None
+    made = import_csv(o.table, o.signals, o.out, rows)
+    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}")
+    return 0
 
 
 def _info(words: list[str]) -> int:

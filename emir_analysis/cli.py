@@ -71,11 +71,22 @@ def _run(words: list[str]) -> int:
 
 
 def _info(words: list[str]) -> int:
-    from emir_analysis.info import info, text
+    from emir_analysis.info import fields_text, info, parameters_text, text
 
     parser = argparse.ArgumentParser(prog="emir info")
     parser.add_argument("bag", type=Path, help="any recording in MCAP")
-    print(text(info(parser.parse_args(words).bag)))
+    parser.add_argument("--fields", action="store_true", help="unit and meaning of every field")
+    parser.add_argument(
+        "--parameters", action="store_true", help="the nodes' parameters, as a ROS parameter file"
+    )
+    options = parser.parse_args(words)
+    found = info(options.bag)
+    if options.fields:
+        print(fields_text(found))
+    if options.parameters:
+        print(parameters_text(found))
+    if not (options.fields or options.parameters):
+        print(text(found))
     return 0
 
 

@@ -126,6 +126,7 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
             "bag": str(plan.bag),
             "description": json.dumps(_description(plan)),
             "topics": list(plan.topics),
+            "nodes": [name for name in plan.nodes if name != "recorder_node"],
         },
     }
     return {

@@ -1,5 +1,6 @@
 """The graph against the plain loop, its recordings against other readers, and dying nodes."""
 
+import json
 import math
 import os
 import re
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from mcap.reader import make_reader
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
@@ -21,6 +23,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.info import info, parameters_text
 from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay, same
@@ -34,13 +37,16 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TOPICS, by_name
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
-from emir_ros.graph import Plan, duration, ros_arguments
+from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.run import main as run_graph
 
 DURATION = 4.8  # s: at rest, and into the plateau of the first move
 
 
 CASCADE_TOPICS = {f"/{name}" for name in Plan(bag=Path()).topics}
+
+
+NODES = set(Plan(bag=Path()).nodes) - {"recorder_node"}
 
 
 def _loop_signals(controller: str) -> dict[str, np.ndarray]:
@@ -109,7 +115,6 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
 
 
 def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
-    from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
     bag = tmp_path / "run"
@@ -132,6 +137,7 @@ def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
             assert {"offered_qos_profiles", "topic_type_hash"} <= channel.metadata.keys()
         stored = {record.name: record.metadata for record in reader.iter_metadata()}
     assert counts == {topic: len(messages) for topic, messages in by_rosbags.items()}
+    assert set(stored["emir.parameters"]) == NODES
     text = (bag / "metadata.yaml").read_text()
     assert stored["rosbag2"]["serialized_metadata"] == text
     assert not re.search(r"[&*]id\d", text)  # rosbag2 writes no anchors
@@ -280,6 +286,34 @@ def test_a_recording_is_never_overwritten(
     with pytest.raises(ValueError, match="exists already"):
         Rosbag2Writer(tmp_path)
     assert (tmp_path / "precious").read_text() == "data"
+
+
+@pytest.mark.parametrize("processes", ["one", "many"])
+def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) -> None:
+    """Parameters as set and as left alone, and what every field means."""
+    file, bag = tmp_path / "params.yaml", tmp_path / "run"
+    file.write_text("cascade_node: {ros__parameters: {gain: 1.5}}\n")
+    words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    with (bag / "run_0.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        stored = {record.name: record.metadata for record in reader.iter_metadata()}
+        summary = reader.get_summary()
+    assert summary is not None
+    parameters = {node: json.loads(text) for node, text in stored["emir.parameters"].items()}
+    assert parameters["cascade_node"]["gain"] == 1.5
+    assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
+    assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
+    for channel in summary.channels.values():
+        topic = by_name(channel.topic[1:])
+        fields = json.loads(channel.metadata["fields"])
+        assert {name: entry["unit"] for name, entry in fields.items()} == {
+            name: field.unit for name, field in topic.fields.items()
+        }
+        assert all(entry["meaning"] for entry in fields.values())
+    again = tmp_path / "again.yaml"
+    again.write_text(parameters_text(info(bag)))
+    assert read_parameters(again) == parameters  # the file sets up the same run
 
 
 def test_parameters_reach_the_nodes(tmp_path: Path) -> None:

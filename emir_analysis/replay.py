@@ -23,6 +23,7 @@ from emir_analysis.node_controls import (
     TrajectoryControl,
 )
 from emir_analysis.run_signals import full_name
+from emir_analysis.switching import Ready
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -32,13 +33,23 @@ from emir_control.pfc import Pfc, PfcParameters
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    OFFERED_COMMANDS,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+    Topic,
+)
 
 Array = NDArray[np.float64]
 Values = dict[str, Any]
 
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop")
-OF_EVERY_NODE = ("lockstep", "input_timeout")  # parameters of the node, not of its controller
+OF_EVERY_NODE = (
+    "lockstep",
+    "input_timeout",
+    "standby",
+)  # parameters of the node, not of its controller
 
 
 @dataclass(frozen=True)
@@ -76,11 +87,19 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
     about = bags.metadata(bag).get("emir", {})
-    control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
+    control: NodeControl | Ready = _control(
+        node, {**_recorded_parameters(bag, node, about), **changed}
+    )
     inputs = _by_stamp(bag, control.inputs)
-    there = bags.recorded_topics(bag)
-    kept = tuple(topic for topic in control.outputs if full_name(topic, there))
-    outputs = _by_stamp(bag, kept or control.outputs)
+    there, answers = bags.recorded_topics(bag), control.outputs
+    offered = OFFERED_COMMANDS.get(node)
+    if offered and full_name(offered, there):  # one of several: it heard what was applied
+        control = Ready(node, control)
+        for stamp, applied in _by_stamp(bag, (SELECTOR_TERMS,)).items():
+            inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
+        answers = tuple(offered if topic is VELOCITY_COMMAND else topic for topic in answers)
+    kept = tuple(topic for topic in answers if full_name(topic, there))
+    outputs = _by_stamp(bag, kept or answers)
     state, rows = None, []
     for stamp, signals in sorted(inputs.items()):
         state, answer = control.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
@@ -96,7 +115,7 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
             np.array([recorded[name] for recorded, _ in rows if name in recorded], dtype=float),
             np.array([answer[name] for recorded, answer in rows if name in recorded], dtype=float),
         )
-        for topic in control.outputs
+        for topic in answers
         for name, field in topic.fields.items()
     ]
 

@@ -64,7 +64,7 @@ class Blind:
 def test_towards_the_end_of_the_stroke_the_piston_comes_to_rest(
     degrees: float, velocity: float
 ) -> None:
-    loop = ClosedLoop(Plant(joint1()), HOLD, Commanding(lambda k: velocity))
+    loop = ClosedLoop(Plant(joint1()), HOLD, Commanding(lambda _: velocity))
     run = loop.run(math.radians(degrees), 2e6, 16.0)
     end = LIMITS.stroke_high if velocity > 0.0 else LIMITS.stroke_low
     left = np.abs(end - run["true_stroke"])

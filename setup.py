@@ -23,7 +23,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=["emir_*"]),
-    package_data={"": ["py.typed", "data/*.yaml"]},
+    package_data={"": ["py.typed", "data/*.yaml", "bench/*.c"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -13,6 +13,7 @@ from emir_common.quantity import ParameterError
 USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
+  import     a CSV file as a recording, by a signal map
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
@@ -21,6 +22,7 @@ USAGE = """usage: emir COMMAND ...
   design     a predictive controller for a machine, and where it is stable
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
 
@@ -30,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
+        "import": _import,
         "info": _info,
         "bag": _bag,
         "replay": _replay,
@@ -38,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "design": _design,
         "figures": _figures,
         "diagnose": _diagnose,
+        "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
         print(USAGE)
@@ -61,13 +65,40 @@ def _complain(who: str, message: str) -> int:
 
 
 def _run(words: list[str]) -> int:
+    """Run the graph."""
+    return _hand_over("emir_ros.run", words)
+
+
+def _hand_over(module: str, words: list[str]) -> int:
     """Hand over to the one package that knows ROS, in this same process.
 
     -P: what lies in the current folder is not imported.
     """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", module, *words])  # noqa: S606
+
+
+def _import(words: list[str]) -> int:
+    from emir_analysis.import_command import import_csv
+
+    parser = argparse.ArgumentParser(prog="emir import")
+    parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
+    parser.add_argument(
+        "--signals", type=Path, required=True, help="YAML: signal, column, topic, field, unit"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="BAG", help="must not exist")
+    parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
+    o = parser.parse_args(words)
+    try:
+        rows = (
+            None if o.rows is None else slice(*(int(n) if n else None for n in o.rows.split(":")))
+        )
+    except (TypeError, ValueError):
+        raise InputError(f"--rows {o.rows}: not of the form A:B") from None
+    made = import_csv(o.table, o.signals, o.out, rows)
+    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}")
+    return 0
 
 
 def _info(words: list[str]) -> int:
@@ -110,7 +141,8 @@ def _bag(words: list[str]) -> int:
 def _replay(words: list[str]) -> int:
     import yaml
 
-    from emir_analysis.replay import NODES, replay, same, text
+    from emir_analysis.replay import NODES, replay, text
+    from emir_analysis.stamped import same
 
     parser = argparse.ArgumentParser(prog="emir replay")
     parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
@@ -191,6 +223,22 @@ def _design(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _bench(words: list[str]) -> int:
+    if words[:1] == ["graph"]:
+        return _hand_over("emir_ros.bench", words[1:])
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
+    from emir_analysis.bench.command import PARTS, command
+
+    parser = argparse.ArgumentParser(prog="emir bench")
+    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    command(parser.parse_args(words), print)
     return 0
 
 

@@ -33,14 +33,18 @@ Signals = dict[str, float]
 Topics = tuple[Topic, ...]
 
 
-class NodeControl(Protocol):
-    """From the signals of the inputs to those of the outputs."""
-
-    inputs: ClassVar[Topics]
-    outputs: ClassVar[Topics]
+class Stepping(Protocol):
+    """From the signals of a period to others."""
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the outputs of one period of dt, s; None: begin here."""
+
+
+class NodeControl(Stepping, Protocol):
+    """What a node computes, from the signals of its inputs to those of its outputs."""
+
+    inputs: ClassVar[Topics]
+    outputs: ClassVar[Topics]
 
 
 @runtime_checkable

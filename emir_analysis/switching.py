@@ -43,8 +43,8 @@ class Ready:
         A controller that is not `Switchable` begins anew when it is chosen.
         """
         before = start = self._caught_up(state, signals, dt)
-        ready = before is not None and isinstance(self.control, Switchable)
-        if ready and not self._drives(signals):
+        stands_by = before is not None and not self._drives(signals)
+        if stands_by and isinstance(self.control, Switchable):
             start = self.control.take_over(before, signals, signals["applied_command"], dt)
         own, outputs = self.control.step(start, signals, dt)
         offered = {f"{self.name}_command": outputs["velocity_command"]}
@@ -125,9 +125,11 @@ class SwitchedLoop:
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
         selector = Selector(tuple(self.controls), self.switches)
-        states, ticks, fed_back = state or ({}, None, {})
+        begin: tuple[dict[str, Any], int | None, Signals] = ({}, None, {})
+        states, ticks, fed_back = state or begin
         known = _signals(now) | fed_back
-        after, offered = {}, {}
+        after: dict[str, ReadyState] = {}
+        offered: Signals = {}
         for name, control in self.controls.items():
             after[name], signals = Ready(name, control).step(states.get(name), known, dt)
             offered |= signals

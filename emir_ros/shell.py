@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from emir_analysis.node_controls import NodeControl
+from emir_analysis.node_controls import NodeControl, Stepping
 from emir_analysis.switching import Ready
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
@@ -110,7 +110,7 @@ class ControlNode(Shell):
         if not self.lockstep:
             self.create_timer(CONTROL_PERIOD_NS * 1e-9, self._on_timer)
 
-    def standing_by(self, control: NodeControl) -> NodeControl:
+    def standing_by(self, control: NodeControl) -> Stepping:
         """Return the controller as this node shall hold it: alone, or one of several."""
         return Ready(self._own, control) if self._standby else control
 

@@ -27,8 +27,9 @@ from emir_analysis.info import info, parameters_text
 from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
 from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
-from emir_analysis.replay import replay, same
+from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_analysis.stamped import same
 from emir_analysis.switching import Switch, SwitchedLoop
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
@@ -104,7 +105,7 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert finished.returncode == 0, finished.stderr
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
-    for node in ("trajectory", controller, "force_loop"):
+    for node in ("trajectory", controller, "force_loop", "plant"):
         assert same(replay(bag, node, {})), node
 
 

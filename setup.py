@@ -38,6 +38,7 @@ setup(
         "mcap-ros2-support>=0.5",
         "numba>=0.59",
         "numpy>=1.26",
+        "plotly>=6.0",
         "pyyaml>=6.0.1",
         "scipy>=1.12",
     ],
@@ -49,6 +50,8 @@ setup(
         "test": [
             "control>=0.10",
             "mujoco>=3.2",
+            "pandas>=2.2",
+            "playwright>=1.40",
             "pytest>=8.2",
             "pytest-timeout>=2.3",
             "rosbags>=0.10",

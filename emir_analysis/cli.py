@@ -17,7 +17,7 @@ USAGE = """usage: emir COMMAND ...
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
-  analyze    figures and pictures of a recording of the graph
+  analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
   figures    the paper's figures, drawn by this machine, and a table of its numbers
@@ -167,19 +167,23 @@ def _replay(words: list[str]) -> int:
 
 
 def _analyze(words: list[str]) -> int:
-    from emir_analysis.run_report import analyze, text, write_json, write_report
+    from emir_analysis import run_report
 
     parser = argparse.ArgumentParser(prog="emir analyze")
-    parser.add_argument("bag", type=Path, help="a recording of the graph")
+    parser.add_argument("bag", type=Path, nargs="+", help="recordings of the graph")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
-    run = analyze(options.bag)
-    print(text(run))
-    if options.json:
-        write_json(run, options.json)
-    if options.html:
-        write_report(run, options.html)
+    runs = [run_report.analyze(bag) for bag in options.bag]
+    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
+    for file, write in (
+        (options.json, run_report.write_json),
+        (options.csv, run_report.write_csv),
+        (options.html, run_report.write_report),
+    ):
+        if file:
+            write(runs, file)
     return 0
 
 

@@ -49,6 +49,8 @@ setup(
         "robot": ["pin>=4.1"],
         # Linear models as python-control systems: emir linearize.
         "design": ["control>=0.10"],
+        # `emir view`: the page in the browser.
+        "view": ["viser>=1.1"],
         "test": [
             "control>=0.10",
             "mujoco>=3.2",

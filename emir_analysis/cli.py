@@ -17,6 +17,7 @@ USAGE = """usage: emir COMMAND ...
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
+  view       a recording or the running graph as a page in the browser: arm, pressures, valve
   analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
@@ -37,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "info": _info,
         "bag": _bag,
         "replay": _replay,
+        "view": _view,
         "analyze": _analyze,
         "compare": _compare,
         "design": _design,
@@ -166,6 +168,12 @@ def _replay(words: list[str]) -> int:
     fields = replay(options.bag, options.node, changed)
     print(text(fields, changed))
     return 0 if changed or same(fields) else 1
+
+
+def _view(words: list[str]) -> int:
+    from emir_analysis.view.command import command
+
+    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
 
 
 def _analyze(words: list[str]) -> int:

@@ -191,56 +191,63 @@ class Machine:
 
     def rates(self, x: Array, time: float, command: float) -> Array:
         """Return dx/dt."""
-        n, b = self.n, self.boom
         state = x.tolist()
         p_h, p_s, spool, rate, logic = state[:HYDRAULIC]
         modes = x[self.modes]
         angle, tip_angle, spin = (self._rows @ modes).tolist()
-        arm = self.lever_arm(angle)
         stroke = self.stroke(angle) + self.play(state)
-        force = p_h * n.area_lifting - p_s * n.area_lowering
+        opening = self.opening(self.edges(spool, state), time, stroke)
+        q_h, q_s, pumped = self.flows(opening, self.supply(time, state), p_h, p_s, logic)
         now = {
             "angle": angle,
             "deflection": tip_angle - angle,
             "pressure_lifting": p_h,
             "pressure_lowering": p_s,
-            "force": force,
+            "force": p_h * self.n.area_lifting - p_s * self.n.area_lowering,
             "spool": spool,
+            "pumped": pumped,
         }
-        opening = self.opening(self.edges(spool, state), time, stroke)
-        q_h, q_s, now["pumped"] = self.flows(opening, self.supply(time, state), p_h, p_s, logic)
-        out_h, out_s = self.leaving(p_h, p_s)
         remembered = self.remembered_rates(time, state, now)
-        velocity = arm * spin
+        velocity = self.lever_arm(angle) * spin
         moved = velocity + now.get("play_rate", 0.0)
-        v_h = n.volume_lifting_0 + n.area_lifting * stroke
-        v_s = n.volume_lowering_0 - n.area_lowering * stroke
-        dp_h = q_h - out_h - n.area_lifting * moved
-        dp_s = q_s - out_s + n.area_lowering * moved
-        dp_h *= self.stiffness(p_h, v_h, lifting=True) / v_h
-        dp_s *= self.stiffness(p_s, v_s, lifting=False) / v_s
-        piloted = self.pilot(p_h, p_s) > n.threshold
         dx = np.empty_like(x)
-        dx[:HYDRAULIC] = (
-            _no_pull(dp_h, p_h),
-            _no_pull(dp_s, p_s),
+        dx[:2] = self._pressure_rates((p_h, p_s), (q_h, q_s), stroke, moved)
+        dx[2:HYDRAULIC] = (
             rate,
             self.acceleration(command, spool, rate),
-            (1.0 - logic) / n.time_constant_opening
-            if piloted
-            else -logic / n.time_constant_closing,
+            self._logic_rate(logic, self.pilot(p_h, p_s)),
         )
-        half = modes.size // 2
-        torque = (force - self.resistance(velocity, force, stroke)) * arm
-        acceleration = self.bending(modes[:half], modes[half:])
-        acceleration += b.joint * torque - b.weight * math.cos(angle)
-        load = self.tip_force(time)
-        if load:
-            acceleration += b.tip * load
-        dx[HYDRAULIC : HYDRAULIC + half] = modes[half:]
-        dx[HYDRAULIC + half : self.modes.stop] = acceleration
+        half = HYDRAULIC + modes.size // 2
+        dx[HYDRAULIC:half] = x[half : self.modes.stop]
+        push = now["force"] - self.resistance(velocity, now["force"], stroke)
+        dx[half : self.modes.stop] = self._accelerations(x, time, angle, push)
         dx[self.modes.stop :] = remembered
         return dx
+
+    def _pressure_rates(
+        self, p: tuple[float, float], q: tuple[float, float], stroke: float, moved: float
+    ) -> tuple[float, float]:
+        n = self.n
+        out_h, out_s = self.leaving(*p)
+        v_h = n.volume_lifting_0 + n.area_lifting * stroke
+        v_s = n.volume_lowering_0 - n.area_lowering * stroke
+        dp_h = (q[0] - out_h - n.area_lifting * moved) * self.stiffness(p[0], v_h, lifting=True)
+        dp_s = (q[1] - out_s + n.area_lowering * moved) * self.stiffness(p[1], v_s, lifting=False)
+        return _no_pull(dp_h / v_h, p[0]), _no_pull(dp_s / v_s, p[1])
+
+    def _logic_rate(self, opened: float, pilot: float) -> float:
+        if pilot > self.n.threshold:
+            return (1.0 - opened) / self.n.time_constant_opening
+        return -opened / self.n.time_constant_closing
+
+    def _accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        """Return those of the modes; push: force on the joint along the cylinder, N."""
+        b = self.boom
+        half = HYDRAULIC + b.joint.size
+        forces = self.bending(x[HYDRAULIC:half], x[half : self.modes.stop])
+        forces += b.joint * (push * self.lever_arm(angle)) - b.weight * math.cos(angle)
+        load = self.tip_force(time)
+        return forces + b.tip * load if load else forces
 
     def run(self, x: Array, times: Array, command: float) -> Array:
         """Return the states at times, (n, s), the first of which is the start, under a command.

@@ -75,7 +75,6 @@ class ClosedLoop:
                 state, truth = self.plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}
 
-
     def _force_loop(
         self, state: ForceLoopState | None, command: float, reading: Measurement
     ) -> tuple[ForceLoopState, dict[str, float]]:

@@ -7,7 +7,7 @@ from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.tip import Tip, TipInputs
-from emir_control.trajectory import Move, Reference
+from emir_control.trajectory import NO_MOVE, Move, Reference
 from emir_plant.sensors import Measurement
 
 Signals = dict[str, float]
@@ -19,7 +19,7 @@ class Situation(NamedTuple):
     reference: Reference
     preview: tuple[float, ...]  # reference strokes of the next periods, m
     reading: Measurement
-    move: Move
+    move: Move = NO_MOVE
 
 
 class OuterLoop(Protocol):
@@ -79,7 +79,12 @@ class LqgLoop:
         """Return the next state and the signals; state None: begin here."""
         r = now.reading
         inputs = LqgInputs(
-            now.reference.stroke, now.move, r.angle, r.pressure_lifting, r.pressure_lowering, r.deflection
+            now.reference.stroke,
+            now.move,
+            r.angle,
+            r.pressure_lifting,
+            r.pressure_lowering,
+            r.deflection,
         )
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
         return state, lqg_signals(outputs)

@@ -141,9 +141,7 @@ class Score:
     def meets(self, ratio: float = AIM_RATIO) -> bool:
         """Tell whether the run meets the aim with this R."""
         return (
-            self.ratio <= ratio
-            and self.settled <= AIM_DEFLECTION
-            and self.position <= AIM_POSITION
+            self.ratio <= ratio and self.settled <= AIM_DEFLECTION and self.position <= AIM_POSITION
         )
 
 

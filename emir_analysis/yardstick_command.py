@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from emir_analysis.compare_command import chosen, save
+from emir_analysis.compare_command import save, select
 from emir_analysis.errors import InputError
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import (
@@ -20,7 +20,6 @@ from emir_analysis.yardstick import (
     EVERYDAY,
     HARD,
     Draw,
-    Range,
     Score,
     controllers,
     draws,
@@ -49,7 +48,7 @@ def command(words: Sequence[str], progress: Progress) -> str:
     among = dataclasses.replace(HARD if options.hard else EVERYDAY, supply=options.supply * 1e5)
     aim = AIM_HARD if options.hard else AIM_RATIO
     machine = joint1()
-    loops = chosen(controllers(machine, among), options.controllers)
+    loops = select(controllers(machine, among), options.controllers)
     scores: Scores = {name: [] for name in loops}
     done: list[tuple[Draw, float]] = []
     for draw in draws(machine, options.draws, options.seed, among):

@@ -8,7 +8,7 @@ with v the piston's velocity and u what both flows together would move it with a
 
     u = (A_H Q_H / V_H - A_S Q_S / V_S) beta / k_h.
 
-`Actuator.command` is the valve command that makes u what it should be.
+`Actuator.opening` is the valve's opening that makes u what it should be.
 """
 
 import math
@@ -94,7 +94,11 @@ class Actuator:
         """Return u, m/s, of an opening in [-1, 1] of the metering edges."""
         lifting, lowering = self._shares(oil.stroke)
         into_lifting, into_lowering = self.flows(opening, oil)
-        driven = self.softness * self.parameters.beta * (lifting * into_lifting - lowering * into_lowering)
+        driven = (
+            self.softness
+            * self.parameters.beta
+            * (lifting * into_lifting - lowering * into_lowering)
+        )
         return driven / self.stiffness(oil.stroke)
 
     def opening(self, wanted: float, oil: Oil) -> float:

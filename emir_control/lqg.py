@@ -23,11 +23,10 @@ from emir_control.boom import Boom, BoomTable
 from emir_control.motion_plan import MotionPlan, Target, planned, resting
 from emir_control.prefilter import joint_angle, piston_velocity
 from emir_control.regulator import Regulator, RegulatorParameters, regulator
-from emir_control.trajectory import Move
+from emir_control.trajectory import NO_MOVE, Move
 
 Array = NDArray[np.float64]
 
-NO_MOVE = Move(-math.inf, 0.0, 0.0)
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 
@@ -66,9 +65,9 @@ class LqgParameters:
 
 
 class Rest(NamedTuple):
-    """Means at rest, since it began: count of periods, F, N, and bending, rad."""
+    """Means at rest, since it began: control periods, F, N, and bending, rad."""
 
-    count: int
+    periods: int
     force: float
     bending: float
 
@@ -135,9 +134,7 @@ class Lqg:
         piloted = inputs.pressure_lifting > self.parameters.actuator.threshold
         return self._begin(rest, inputs._replace(move=NO_MOVE), float(piloted), 0.0)
 
-    def step(
-        self, state: LqgState, inputs: LqgInputs, dt: float
-    ) -> tuple[LqgState, LqgOutputs]:
+    def step(self, state: LqgState, inputs: LqgInputs, dt: float) -> tuple[LqgState, LqgOutputs]:
         """Return the valve command of this control period of dt, s.
 
         An input that is not a number shuts the valve and begins anew.
@@ -146,7 +143,7 @@ class Lqg:
             nan = math.nan
             return state._replace(command=0.0), LqgOutputs(0.0, nan, nan, nan, nan, nan, nan)
         state = self._prepared(state, inputs)
-        p, plan, law = self.parameters, state.plan, state.regulator
+        plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
         estimate = self._corrected(state, inputs, target)
@@ -180,7 +177,7 @@ class Lqg:
             if state.moving:
                 return state
             return self._begin(state.rest, inputs, state.logic, state.command)
-        count = 1 if state.moving else state.rest.count + 1
+        count = 1 if state.moving else state.rest.periods + 1
         weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         rest = Rest(
@@ -199,24 +196,20 @@ class Lqg:
         payload = p.boom.payload(torque)
         boom = p.boom.loaded(payload)
         plan = self._plan(boom, inputs.reference, move)
-        law = regulator(
-            boom, drive, inputs.reference + 0.5 * move.distance, p.period, p.regulator
-        )
+        law = regulator(boom, drive, inputs.reference + 0.5 * move.distance, p.period, p.regulator)
         estimate = np.zeros(len(law.A))
         if move.distance:
             estimate[law.force] = math.copysign(p.friction / plan.stiffness, move.distance)
         offset = (rest.bending - float(plan.bending[0])) / math.cos(angle)
         past = (0.0,) * law.delays
         moving = move.distance != 0.0
-        return LqgState(
-            plan, law, payload, offset, rest, estimate, past, logic, command, moving
-        )
+        return LqgState(plan, law, payload, offset, rest, estimate, past, logic, command, moving)
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
             return resting(boom, self.drive, start)
         allowance = self.parameters.allowance
-        return planned(boom, self.drive, start, move.distance, move.duration, allowance)
+        return planned(boom, self.drive, start, move, allowance)
 
     def _corrected(self, state: LqgState, inputs: LqgInputs, target: Target) -> Array:
         """Return x corrected by what is measured."""
@@ -238,17 +231,14 @@ class Lqg:
         off[law.controlled - 1] -= estimate[law.force]
         return -flow - float(law.feedback @ off)
 
-    def _resting(
-        self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool
-    ) -> bool:
+    def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
         """Tell whether the valve stays shut."""
         p, q = self.parameters, estimate[: law.modes]
         if not arrived:
             return abs(wanted) < p.standstill
         quiet = abs(law.deflection @ q) < p.rest_deflection
         return bool(
-            (quiet and abs(law.position @ q) < p.rest_position)
-            or abs(wanted) < p.rest_standstill
+            (quiet and abs(law.position @ q) < p.rest_position) or abs(wanted) < p.rest_standstill
         )
 
     def _moved(
@@ -261,9 +251,7 @@ class Lqg:
         if opening == 0.0:  # a shut valve lets no unknown flow through
             ahead[law.flow] *= SHUT_DECAY
         command = self.drive.command(opening)
-        if command != state.command and command != 0.0:  # the spool's play, taken up ahead
+        if command not in {state.command, 0.0}:  # the spool's play, taken up ahead
             command += math.copysign(0.5 * self.parameters.hysteresis, command - state.command)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, period)
-        return state._replace(
-            estimate=ahead, past=given_all[:-1], logic=logic, command=command
-        )
+        return state._replace(estimate=ahead, past=given_all[:-1], logic=logic, command=command)

@@ -15,6 +15,7 @@ from emir_control.actuator import Actuator
 from emir_control.boom import Boom, ClampedBoom
 from emir_control.least_bending import STEP, Motion, Task, plan
 from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
+from emir_control.trajectory import Move
 
 Array = NDArray[np.float64]
 
@@ -65,19 +66,17 @@ class MotionPlan:
         return (then.stroke - now.stroke + pushed) / dt
 
 
-def planned(
-    boom: Boom, drive: Actuator, start: float, distance: float, duration: float, allowance: float
-) -> MotionPlan:
-    """Return the plan of a move of the piston from a stroke, m, by a distance, m, in a duration, s.
+def planned(boom: Boom, drive: Actuator, start: float, move: Move, allowance: float) -> MotionPlan:
+    """Return the plan of a move from a stroke, m, its deflection within an allowance, 1.
 
     Raises NoMotionError where the valve's flow does not allow it.
     """
     linkage = drive.parameters.static
-    ends = joint_angle(start, linkage), joint_angle(start + distance, linkage)
+    ends = joint_angle(start, linkage), joint_angle(start + move.distance, linkage)
     turn = ends[1] - ends[0]
-    arm = distance / turn
+    arm = move.distance / turn
     low, high = -linkage.flow_lowering / linkage.area_lowering, linkage.flow_lifting
-    task = Task(turn, duration, low / arm, high / linkage.area_lifting / arm)
+    task = Task(turn, move.duration, low / arm, high / linkage.area_lifting / arm)
     clamped = boom.clamped()
     return _follow(boom, drive, ends[0], plan(clamped, task, allowance), clamped)
 

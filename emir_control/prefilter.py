@@ -66,16 +66,6 @@ def joint_angle(stroke: float, p: PrefilterParameters) -> float:
     return math.acos(cosine) - p.triangle_gamma0
 
 
-def piston_stroke(angle: float, p: PrefilterParameters) -> float:
-    """Return the piston stroke, m, at a joint angle, rad (1)."""
-    a, b = p.triangle_a, p.triangle_b
-
-    def length(opening: float) -> float:
-        return math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(opening))
-
-    return length(angle + p.triangle_gamma0) - length(p.triangle_gamma0)
-
-
 def piston_velocity(joint_rate: float, angle: float, p: PrefilterParameters) -> float:
     """Return the piston velocity, m/s, for a joint rate, rad/s, at the joint angle, rad (1)."""
     a, b, opening = p.triangle_a, p.triangle_b, angle + p.triangle_gamma0

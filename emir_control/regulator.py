@@ -81,7 +81,7 @@ class Regulator:
     @property
     def delays(self) -> int:
         """Return l."""
-        return self.B.shape[1] - 1
+        return int(self.B.shape[1]) - 1
 
     @property
     def force(self) -> int:
@@ -100,7 +100,7 @@ def regulator(
     """Return the regulator about rest at a stroke, m, for control periods of a length, s."""
     m = min(p.modes, len(boom.joint))
     continuous, stiffness = _continuous(boom, drive, stroke, m)
-    A, B = _sampled(continuous, m, period, p.delay + drive.lag)
+    A, B = _sampled(continuous, period, p.delay + drive.lag)
     C = np.zeros((3, len(A)))
     C[0, :m], C[1, :m], C[2, 2 * m] = boom.joint[:m], (boom.tip_angle - boom.joint)[:m], 1.0
     extended, driven = _with_past(A, B, m)
@@ -147,7 +147,7 @@ def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Arr
     return model, stiffness
 
 
-def _sampled(continuous: Array, m: int, period: float, late: float) -> tuple[Array, Array]:
+def _sampled(continuous: Array, period: float, late: float) -> tuple[Array, Array]:
     """Return A, (n, n), and B, (n, l + 1), of an input that is held and comes late, s."""
     n = len(continuous)
 

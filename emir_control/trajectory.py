@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 
-
 HALF_OF_PAUSE = 0.5  # after that the next move counts as the one to come
 
 
@@ -23,6 +22,9 @@ class Move(NamedTuple):
     since: float  # s since its start, negative before
     duration: float  # s
     distance: float  # m
+
+
+NO_MOVE = Move(-math.inf, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ USAGE = """usage: emir COMMAND ...
   view       a recording or the running graph as a page in the browser: arm, pressures, valve
   analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
+  limit      the smallest deflection of the TCP that any command could reach for a move
+  yardstick  controllers against that limit, over random draws of the machine
   design     a predictive controller for a machine, and where it is stable
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
@@ -42,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "view": _view,
         "analyze": _analyze,
         "compare": _compare,
+        "limit": _limit,
+        "yardstick": _yardstick,
         "design": _design,
         "linearize": _linearize,
         "figures": _figures,
@@ -215,6 +219,20 @@ def _compare(words: list[str]) -> int:
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _limit(words: list[str]) -> int:
+    from emir_analysis.limit_command import command
+
+    print(command(words))
+    return 0
+
+
+def _yardstick(words: list[str]) -> int:
+    from emir_analysis.yardstick_command import command
+
+    print(command(words, _progress))
     return 0
 
 

@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -26,6 +25,7 @@ from emir_msgs_py.topics import (
     TRUTH,
     VALVE_COMMAND,
 )
+from emir_msgs_py.wire import Wire, stamp_ns
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
@@ -87,7 +87,8 @@ class PlantNode(Shell):
         self._recorded = -1
         profile = qos.requested(VALVE_COMMAND, lockstep=self.lockstep)
         kind = conversions.message_class(VALVE_COMMAND.type)
-        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile)
+        self._command_wire = Wire(VALVE_COMMAND)
+        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile, raw=True)
         if self.lockstep:
             self._start_lockstep()
         else:
@@ -194,12 +195,12 @@ class PlantNode(Shell):
             return 0.0
         return self._command[1]
 
-    def _on_command(self, message: Any) -> None:
-        command = conversions.values(VALVE_COMMAND, message)["valve_command"]
+    def _on_command(self, data: bytes) -> None:
+        command = self._command_wire.decode(data)["valve_command"]
         if not math.isfinite(command):
             self.get_logger().error(f"{VALVE_COMMAND.name} is {command}: valve shut")
             command = 0.0
-        self._command = (conversions.stamp_ns(message), command)
+        self._command = (stamp_ns(data), command)
         self._command_received = time.monotonic()
         if self.lockstep:
             self._advance_when_answered()

@@ -13,6 +13,7 @@ from rclpy.node import Node
 
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
+from emir_msgs_py.wire import Wire, stamp_ns
 from emir_ros import qos
 from emir_ros.node_parameters import declare
 
@@ -39,7 +40,8 @@ class Shell(Node):
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
         self._outputs = {
-            topic.name: (topic, self._publisher(topic.type, topic.name)) for topic in outputs
+            topic.name: (topic, Wire(topic), self._publisher(topic.type, topic.name))
+            for topic in outputs
         }
 
     def _publisher(self, type_name: str, name: str) -> Any:
@@ -48,8 +50,8 @@ class Shell(Node):
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
-        publisher = self._outputs[topic.name][1]
-        publisher.publish(conversions.message(topic, stamp, signals))
+        _, wire, publisher = self._outputs[topic.name]
+        publisher.publish(wire.encode(stamp, signals))
 
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
@@ -89,20 +91,19 @@ class ControlNode(Shell):
         return None
 
     def _subscribe(self, topic: Topic) -> None:
-        def receive(message: Any) -> None:
-            signals = conversions.values(topic, message)
-            if self.lockstep:
-                self._on_stamp(topic, conversions.stamp_ns(message), signals)
-            else:
-                self._latest[topic.name] = (self.get_clock().now(), signals)
+        wire = Wire(topic)
+
+        def receive(data: bytes) -> None:
+            if not self.lockstep:
+                self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
+            elif stamp_ns(data) % CONTROL_PERIOD_NS == 0:
+                self._on_stamp(topic, stamp_ns(data), wire.decode(data))
 
         kind = conversions.message_class(topic.type)
         profile = qos.requested(topic, lockstep=self.lockstep)
-        self.create_subscription(kind, topic.name, receive, profile)
+        self.create_subscription(kind, topic.name, receive, profile, raw=True)
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
-        if stamp % CONTROL_PERIOD_NS:
-            return
         complete = self._pending.setdefault(stamp, {})
         complete[topic.name] = signals
         if len(complete) == len(self._inputs):
@@ -131,5 +132,5 @@ class ControlNode(Shell):
         self._publish_all(stamp, self.control(signals, CONTROL_PERIOD_NS * 1e-9))
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
-        for topic, _ in self._outputs.values():
+        for topic, _, _ in self._outputs.values():
             self.publish(topic, stamp, signals)

@@ -25,7 +25,6 @@ from emir_msgs_py.topics import (
     TRUTH,
     VALVE_COMMAND,
 )
-from emir_msgs_py.wire import Wire, stamp_ns
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
@@ -33,6 +32,7 @@ from emir_ros import qos
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
+from emir_ros.wire import Wire, stamp_ns
 
 OUTPUTS = [
     JOINT_STATES,

@@ -27,18 +27,17 @@ from emir_msgs_py.topics import (
     Topic,
     by_name,
 )
-from emir_msgs_py.wire import stamp_ns
 from emir_ros import qos
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.shell import Shell
+from emir_ros.wire import stamp_ns
 
 PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
-
 
 
 class RecorderNode(Shell):

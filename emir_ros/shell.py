@@ -13,9 +13,9 @@ from rclpy.node import Node
 
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
-from emir_msgs_py.wire import Wire, stamp_ns
 from emir_ros import qos
 from emir_ros.node_parameters import declare
+from emir_ros.wire import Wire, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.time import Time

@@ -1,18 +1,25 @@
 """A topic's messages as the bytes on the wire (CDR), without building message objects.
 
 Building a message and having it serialized takes longer than all else that a node does in a
-period. But of a topic's message only the stamp and the signals ever change. So the middleware's
-own serializer is asked once, for a message of marked numbers, which shows where they stand.
+period. But of a topic's message only the stamp and the signals ever change. So a serializer is
+asked once, for a message of marked numbers, which shows where they stand; it is mcap's, since
+the middleware's own leaves whatever was in memory between the fields.
 """
 
 import struct
 from collections.abc import Mapping
 from functools import cached_property
+from io import BytesIO
 from typing import Any
+
+from mcap.reader import make_reader
+from mcap_ros2.writer import Writer
+from rclpy.serialization import deserialize_message
 
 from emir_msgs_py import conversions
 from emir_msgs_py.conversions import NANOSECONDS
 from emir_msgs_py.topics import Topic
+from emir_ros.message_definitions import definition
 
 STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
 _MARKED_STAMP = 1_234_567_891_123_456_789  # ns
@@ -88,12 +95,16 @@ def _double(value: float) -> bytes:
 
 
 def _serialized(topic: Topic, stamp: int, signals: Mapping[str, float]) -> bytes:
-    from rclpy.serialization import serialize_message  # noqa: PLC0415 (as conversions.message)
-
-    return bytes(serialize_message(conversions.message(topic, stamp, signals)))
+    """Return the message by way of a file in memory, the serializer's public door."""
+    stream = BytesIO()
+    writer = Writer(stream)
+    kind = writer.register_msgdef(topic.type, definition(topic.type))
+    writer.write_message(topic.name, kind, conversions.message(topic, stamp, signals))
+    writer.finish()
+    stream.seek(0)
+    ((_, _, message),) = make_reader(stream).iter_messages()
+    return message.data
 
 
 def _deserialized(topic: Topic, data: bytes) -> Any:
-    from rclpy.serialization import deserialize_message  # noqa: PLC0415 (as above)
-
     return deserialize_message(data, conversions.message_class(topic.type))

@@ -21,6 +21,7 @@ USAGE = """usage: emir COMMAND ...
   analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
+  linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
   bench      how fast machine, controllers and graph are, beside other programs
@@ -41,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "analyze": _analyze,
         "compare": _compare,
         "design": _design,
+        "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
         "bench": _bench,
@@ -251,6 +253,13 @@ def _bench(words: list[str]) -> int:
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     command(parser.parse_args(words), print)
+    return 0
+
+
+def _linearize(words: list[str]) -> int:
+    from emir_analysis.linearize_command import command
+
+    print(command(words))
     return 0
 
 

@@ -110,6 +110,8 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             if stop.made:
                 raise KeyboardInterrupt
             executor.spin_once(timeout_sec=0.1)
+            for node in nodes.values():
+                node.check()
         _receive_the_rest(executor)
     finally:
         for node in nodes.values():

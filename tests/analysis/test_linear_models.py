@@ -135,6 +135,16 @@ def test_bad_input_is_one_clear_line(
     assert shown.count("\n") == 1
 
 
+def test_more_than_the_rated_payload_is_allowed_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--payload", "1600", "--angle", "75", "--order", "6", "--out", str(tmp_path)]
+    assert main(["linearize", *words]) == 0
+    assert capsys.readouterr().err == (
+        "warning: payload = 1600 kg: the machine is made for 1500 kg\n"
+    )
+
+
 def test_without_python_control_the_command_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

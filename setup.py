@@ -47,6 +47,10 @@ setup(
         "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
         # The whole robot's mechanics; the main joint does without.
         "robot": ["pin>=4.1"],
+        # Linear models as python-control systems: emir linearize.
+        "design": ["control>=0.10"],
+        # `emir view`: the page in the browser.
+        "view": ["viser>=1.1"],
         "test": [
             "control>=0.10",
             "mujoco>=3.2",

@@ -17,9 +17,11 @@ USAGE = """usage: emir COMMAND ...
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
+  view       a recording or the running graph as a page in the browser: arm, pressures, valve
   analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   design     a predictive controller for a machine, and where it is stable
+  linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
   bench      how fast machine, controllers and graph are, beside other programs
@@ -36,9 +38,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "info": _info,
         "bag": _bag,
         "replay": _replay,
+        "view": _view,
         "analyze": _analyze,
         "compare": _compare,
         "design": _design,
+        "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
         "bench": _bench,
@@ -166,6 +170,12 @@ def _replay(words: list[str]) -> int:
     return 0 if changed or same(fields) else 1
 
 
+def _view(words: list[str]) -> int:
+    from emir_analysis.view.command import command
+
+    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
+
+
 def _analyze(words: list[str]) -> int:
     from emir_analysis import run_report
 
@@ -253,6 +263,13 @@ def _bench(words: list[str]) -> int:
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     command(parser.parse_args(words), print)
+    return 0
+
+
+def _linearize(words: list[str]) -> int:
+    from emir_analysis.linearize_command import command
+
+    print(command(words))
     return 0
 
 

@@ -242,6 +242,10 @@ def _design(words: list[str]) -> int:
         "--observer", type=float, default=0.0, metavar="M/S",
         help="Kalman filter in place of an independent model: unknown input's change per sample",
     )  # fmt: skip
+    parser.add_argument(
+        "--schedule", action="store_true",
+        help="models over posture and payload, which the controller reads off the static force",
+    )  # fmt: skip
     parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")

@@ -14,8 +14,9 @@ from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
-from emir_control.pfc import PREVIEW, Future, Pfc
-from emir_control.pfc_file import STROKE, TIP_ANGLE
+from emir_control.pfc import PREVIEW, Future
+from emir_control.pfc_file import SCHEDULED, STROKE, TIP_ANGLE
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack
 from emir_plant.parameters import Machine
@@ -39,9 +40,13 @@ def controllers(
     loops: dict[str, OuterLoop] = {"cascade": CascadeLoop()}
     futures: tuple[Future, ...] = ("preview", "velocity", "constant")
     for future in futures:
-        loops[f"pfc, {future}"] = PfcLoop(Pfc(replace(joint, future=future)))
+        loops[f"pfc, {future}"] = PfcLoop(law_of(replace(joint, future=future)))
     for future in futures:
-        loops[f"pfc_tip, {future}"] = PfcTipLoop(Tip(Pfc(replace(tip, future=future))))
+        loops[f"pfc_tip, {future}"] = PfcTipLoop(Tip(law_of(replace(tip, future=future))))
+    following = {output: pfc_file.find(SCHEDULED, output) for output in (STROKE, TIP_ANGLE)}
+    by_load = {output: law_of(pfc_file.load(file, output)) for output, file in following.items()}
+    loops[f"pfc, {SCHEDULED}"] = PfcLoop(by_load[STROKE])
+    loops[f"pfc_tip, {SCHEDULED}"] = PfcTipLoop(Tip(by_load[TIP_ANGLE]))
     return loops
 
 

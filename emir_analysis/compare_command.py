@@ -3,11 +3,12 @@
 import math
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from emir_analysis import compare_grid, damping, trade_off
+from emir_analysis import compare_grid, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.errors import InputError
@@ -24,18 +25,32 @@ def command(options: Namespace, progress: Progress) -> str:
     """Run, draw, return the tables. Raises InputError or ParameterError."""
     if options.damping:
         if options.picture:
-            _save(damping.picture(joint1()), options.picture)
+            save(damping.picture(joint1()), options.picture)
         return damping.as_text(joint1())
     if options.trade_off:
         curve = trade_off.curve(joint1(), progress)
         if options.picture:
-            _save(trade_off.picture(curve), options.picture)
+            save(trade_off.picture(curve), options.picture)
         return trade_off.as_text(curve)
-    chosen = _chosen(controllers(options.pfc, options.pfc_tip), options.controllers)
+    chosen = select(_known(options), options.controllers)
     cases = _cases(options)
     if len(cases) > 1:
         return _grid(chosen, cases, options, progress)
     return _one(chosen, cases[0], options, progress)
+
+
+def _known(options: Namespace) -> dict[str, OuterLoop]:
+    """Return every controller, those of `emir yardstick` made for this machine."""
+    known, machine = controllers(options.pfc, options.pfc_tip), joint1()
+    as_it_is = replace(
+        yardstick.EVERYDAY,
+        delay=0.0,
+        hysteresis=0.0,
+        supply=machine.supply.p0,
+        threshold=machine.logic_block.threshold,
+    )
+    others = yardstick.controllers(machine, as_it_is)
+    return known | {k: loop for k, loop in others.items() if f"{k}, preview" not in known}
 
 
 def _cases(options: Namespace) -> list[Case]:
@@ -54,7 +69,7 @@ def _grid(
         raise InputError("--repeat is for one case: a grid varies enough")
     found = compare_grid.results(joint1(), chosen, cases, progress)
     if options.picture:
-        _save(compare_grid.picture(found), options.picture)
+        save(compare_grid.picture(found), options.picture)
     if options.csv:
         compare_grid.write_csv(found, options.csv)
     count = len({result.case for result in found})
@@ -62,7 +77,8 @@ def _grid(
     return f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
 
 
-def _chosen(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
+def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
+    """Return the controllers of these names, or all; raises ParameterError for an unknown one."""
     for name in names or ():
         if name not in known:
             raise ParameterError(f"controller {name!r}: there are {'; '.join(known)}")
@@ -86,11 +102,12 @@ def _one(chosen: dict[str, OuterLoop], case: Case, options: Namespace, progress:
     except SimulationError as error:
         return f"{title}: {error}"
     if options.picture:
-        _save(picture({name: found[0] for name, found in runs.items()}), options.picture)
+        save(picture({name: found[0] for name, found in runs.items()}), options.picture)
     return f"{title}\n\n{as_text(runs)}"
 
 
-def _save(figure: Figure, file: Path) -> None:
+def save(figure: Figure, file: Path) -> None:
+    """Write a picture; raises InputError, naming the file."""
     try:
         figure.savefig(file, dpi=120)
     except (OSError, ValueError) as error:

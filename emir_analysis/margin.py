@@ -69,8 +69,16 @@ def linear_machine(machine: Machine, point: OperatingPoint) -> LinearMachine:
 def gain_margin(linear: LinearMachine, outer: OuterLoop) -> float:
     """Return the factor on the machine's gain from which on a push does not die out any more.
 
-    Below 1 the loop is unstable; 1/WIDEST and WIDEST stand for beyond that.
+    Below 1 the loop is unstable; 1/WIDEST and WIDEST stand for beyond that. Not a number for a
+    controller that commands the valve itself, without the force loop.
     """
+    begin = Situation(
+        Reference(linear.at.stroke, 0.0),
+        (linear.at.stroke,) * PREVIEW,
+        linear.measured(np.zeros(linear.model.order)),
+    )
+    if "velocity_command" not in outer.step(None, begin, PERIOD)[1]:
+        return math.nan
     low, high = -math.log(WIDEST), math.log(WIDEST)
     if dies_out(linear, outer, WIDEST):
         return WIDEST

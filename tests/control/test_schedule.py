@@ -48,7 +48,7 @@ def test_payload_is_read_off_the_force_on_which_the_machine_rests(
 ) -> None:
     plant = Plant(with_values(joint1(), {"geometry.payload": payload}))
     shown = plant.outputs(plant.initial(math.radians(degrees), 2e6))
-    assert _schedule().payload(shown.stroke, shown.force) == pytest.approx(payload, abs=15.0)
+    assert _schedule().payload(shown.stroke, shown.force) == pytest.approx(payload, abs=40.0)
 
 
 def test_weights_are_bilinear_and_one_at_a_node() -> None:

@@ -15,6 +15,7 @@ from emir_analysis.errors import InputError
 from emir_analysis.outer_loop import OuterLoop
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_plant.parameters import cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1
 
@@ -93,6 +94,8 @@ def _one(chosen: dict[str, OuterLoop], case: Case, options: Namespace, progress:
     trajectory = named(options.trajectory, given)
     if trajectory.parameters.distance == 0.0:
         raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
+    for line in cautions(machine):
+        progress(line)
     runs: dict[str, list[Run]] = {}
     try:
         for name, outer in chosen.items():

@@ -1,0 +1,130 @@
+"""Which effects an actuator has: chosen by the free run's error on blocks left out of the fit."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from emir_analysis.diagnosis.actuator.fitting import Fitted, Mask, fit, free_run_error
+from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_plant.actuator import REGISTRY, ActuatorSheet
+
+FOLDS = 4  # each leaves every fourth block out
+BLOCK = 1.25  # slow periods in a block, so that it is not known from its neighbours
+INDEPENDENT = 4.0  # errors in a slow period that count as independent
+BETTER = 6.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
+MOST_EFFECTS = 8
+MOST_FITTED = 6  # candidates of a round that go on from a first fit to one with restarts
+MOST_TESTED = 3  # and from there to the blocks left out
+RESTARTS = 2
+FIRST_RESTARTS = 8
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A fit, its score (smaller is better) and the RMS error of blocks left out of fits like it.
+
+    unseen: infinite where the score already spoke against it.
+    """
+
+    fitted: Fitted
+    score: float
+    unseen: float = math.inf
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was tried, in its order, and the chosen one; rivals: as good and no larger."""
+
+    plain: Tried
+    chosen: Tried
+    tried: tuple[Tried, ...]
+    rivals: tuple[Tried, ...]
+
+
+def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
+    """Add one effect after the other while the blocks left out get better, then try to drop."""
+    progress("parameters only")
+    plain_fit = fit(sheet, (), record, sheet.machine, restarts=FIRST_RESTARTS)
+    slow = 2.0 * np.pi / plain_fit.machine.load.frequency / record.period
+    independent = record.pressure.size / slow * INDEPENDENT
+    folds = _folds(record.pressure.size, max(1, round(BLOCK * slow)))
+
+    def fitted(effects: tuple[str, ...], known: Fitted, restarts: int = RESTARTS) -> Tried:
+        found = fit(sheet, effects, record, known.machine, restarts=restarts)
+        return Tried(found, _score(found.rms, independent, found.x.size))
+
+    def tested(tried: Tried) -> Tried:
+        progress(f"blocks left out: {tried.fitted.name}")
+        return replace(tried, unseen=_unseen(sheet, tried.fitted, record, folds))
+
+    plain = tested(Tried(plain_fit, _score(plain_fit.rms, independent, plain_fit.x.size)))
+    best = plain
+    tried = [plain]
+    rivals: list[Tried] = []
+    while len(best.fitted.effects) < MOST_EFFECTS:
+        names = [name for name in REGISTRY if name not in best.fitted.effects]
+        progress(f"candidates beside: {best.fitted.name}")
+        round_ = [fitted((*best.fitted.effects, name), best.fitted, 0) for name in names]
+        round_.sort(key=lambda t: t.score)
+        for k, first in enumerate(round_[:MOST_FITTED]):
+            again = fitted(first.fitted.effects, best.fitted)
+            round_[k] = min(first, again, key=lambda t: t.score)
+        round_.sort(key=lambda t: t.score)
+        better = [t for t in round_ if t.score < best.score - BETTER][:MOST_TESTED]
+        held = [tested(t) for t in better]
+        tried += held + round_[len(held) :]
+        convincing = [t for t in held if t.unseen < best.unseen]
+        if not convincing:
+            break
+        best = convincing[0]
+        rivals = [t for t in convincing[1:] if _rivals(t, best)]
+    best = _dropped(best, fitted, tested, tried)
+    return Search(plain, best, tuple(tried), tuple(rivals))
+
+
+def _rivals(one: Tried, best: Tried) -> bool:
+    return one.score < best.score + BETTER and one.fitted.x.size <= best.fitted.x.size
+
+
+def _dropped(
+    best: Tried,
+    fitted: Callable[[tuple[str, ...], Fitted], Tried],
+    tested: Callable[[Tried], Tried],
+    tried: list[Tried],
+) -> Tried:
+    """Leave out each effect in turn, where that does the fit and the blocks left out no harm."""
+    for name in best.fitted.effects[:-1]:  # the last one was tested last
+        fewer = tuple(effect for effect in best.fitted.effects if effect != name)
+        without = fitted(fewer, best.fitted)
+        if without.score < best.score:
+            without = tested(without)
+            if without.unseen < best.unseen:
+                best = without
+        tried.append(without)
+    return best
+
+
+def _score(rms: float, independent: float, unknowns: int) -> float:
+    """Return the Bayesian information criterion; smaller is better."""
+    return independent * 2.0 * float(np.log(rms)) + unknowns * float(np.log(independent))
+
+
+def _folds(samples: int, block: int) -> list[Mask]:
+    """Return the samples that each fit sees, (n,) true: all but every fourth block."""
+    number = np.arange(samples) // block
+    return [number % FOLDS != fold for fold in range(FOLDS)]
+
+
+def _unseen(
+    sheet: ActuatorSheet, whole: Fitted, record: ActuatorRecord, folds: list[Mask]
+) -> float:
+    """Return the RMS error of all blocks, each simulated by a fit that has not seen it."""
+    error = np.zeros(record.pressure.size)
+    for seen in folds:
+        part = fit(sheet, whole.effects, record, whole.machine, seen=seen)
+        error[~seen] = free_run_error(part.machine, record)[~seen]
+    return float(np.sqrt(np.mean(error**2)))

@@ -42,9 +42,14 @@ def _fields(names: tuple[str, ...]) -> np.dtype[Any]:
     return np.dtype([(name, np.float64) for name in names])
 
 
+def field(path: str) -> str:
+    """Return the record's field of a parameter given by its dotted path."""
+    return path.replace(".", "_")
+
+
 def record(actuator: Actuator) -> Any:
-    """Return the parameters as the flat record that the compiled functions read."""
-    values = {path.replace(".", "_"): value for path, (_, value) in declared(actuator).items()}
+    """Return the parameters as the flat record, (1,), that the compiled functions read."""
+    values = {field(path): value for path, (_, value) in declared(actuator).items()}
     return np.array([tuple(values.values())], dtype=_fields(tuple(values)))
 
 
@@ -54,7 +59,12 @@ def simulate(actuator: Actuator, command: Array, period: float, start: float = 0
     command: (n,) valve opening, straight between its samples. period: time between them. start:
     pressure at the first sample.
     """
-    return np.asarray(_run(record(actuator), command, np.zeros(0), period, start)[:, 0])
+    return run(record(actuator), command, period, start)
+
+
+def run(parameters: Any, command: Array, period: float, start: float) -> Array:
+    """Return the same from parameters in a record: for fits, which simulate often."""
+    return np.asarray(_run(parameters, command, np.zeros(0), period, start)[:, 0])
 
 
 def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -> Array:

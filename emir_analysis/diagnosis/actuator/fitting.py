@@ -13,6 +13,8 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet, simulate
+from emir_plant.actuator.model import field, run
+from emir_plant.actuator.model import record as flat_record
 
 STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
 EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
@@ -94,7 +96,8 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     """Minimise the free-run error of the pressure, or of the part `seen` (n,) of it.
 
     known: machine at which the search starts; effects that it lacks start at their trial values.
-    restarts: further starts, each the best of some places around that one, the same every time.
+    restarts: further starts, each the best of some places anywhere in the data sheet's ranges or
+    around that machine in turn, the same every time.
     """
     members = unknowns(sheet, effects)
     low = np.array([member.low for member in members])
@@ -105,8 +108,14 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
         values = {m.path: m.value(float(v)) for m, v in zip(members, x, strict=True)}
         return with_values(sheet.machine, values)
 
+    parameters = flat_record(sheet.machine)
+    places = [field(member.path) for member in members]
+
     def error(x: Array) -> Array:
-        return np.asarray(free_run_error(machine(x), record)[part])
+        for place, member, v in zip(places, members, x, strict=True):
+            parameters[place] = member.value(float(v))
+        simulated = run(parameters, record.opening, record.period, float(record.pressure[0]))
+        return np.asarray((simulated - record.pressure)[part])
 
     def jacobian(x: Array) -> Array:
         here = error(x)
@@ -117,15 +126,21 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     first = _start(members, effects, known)
     random = np.random.default_rng(0)
 
-    def drawn() -> Array:
+    def near() -> Array:
         signs = random.uniform(-1.0, 1.0, first.size)
         return np.array([m.near(x, r) for m, x, r in zip(members, first, signs, strict=True)])
+
+    def anywhere() -> Array:
+        stated = len(sheet.ranges)
+        return np.append(random.uniform(low, high)[:stated], near()[stated:])
 
     def size(x: Array) -> float:
         return float(np.mean(error(x) ** 2))
 
     starts = [first]
-    starts += [min((drawn() for _ in range(DRAWN)), key=size) for _ in range(restarts)]
+    for k in range(restarts):
+        draw = near if k % 2 else anywhere
+        starts.append(min((draw() for _ in range(DRAWN)), key=size))
     margin = 1e-6 * (high - low)
     found = [
         least_squares(

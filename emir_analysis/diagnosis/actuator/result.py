@@ -219,9 +219,15 @@ def _statement(verdict: str, found: Search, noise: float) -> str:
         return f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says why"
     names = chosen.fitted.name
     if verdict == "ambiguous":
-        others = " or ".join(rival.fitted.effects[-1] for rival in found.rivals)
-        names += f" (the last of them or {others}, which this recording cannot tell apart)"
+        rivals = " or ".join(_instead(rival.fitted, chosen.fitted) for rival in found.rivals)
+        names += f" ({rivals} would do as well: this recording cannot tell)"
     return f"{names}; {left}"
+
+
+def _instead(rival: Fitted, chosen: Fitted) -> str:
+    added = [name for name in rival.effects if name not in chosen.effects]
+    missing = [name for name in chosen.effects if name not in rival.effects]
+    return f"{' and '.join(added)} in place of {' and '.join(missing)}"
 
 
 def _parameters(fitted: Fitted) -> dict[str, Parameter]:

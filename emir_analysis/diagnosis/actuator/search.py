@@ -15,9 +15,9 @@ BLOCK = 1.25  # slow periods in a block, so that it is not known from its neighb
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
 BETTER = 6.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
 MOST_EFFECTS = 8
-MOST_FITTED = 6  # candidates of a round that go on from a first fit to one with restarts
-MOST_TESTED = 3  # and from there to the blocks left out
-RESTARTS = 2
+BREADTH = 3  # sets of effects that are followed at a time: the best first one may lead astray
+MOST_FITTED = 8  # candidates beside each that go on from a first fit to one with restarts
+RESTARTS = 3
 FIRST_RESTARTS = 8
 
 Progress = Callable[[str], None]
@@ -46,7 +46,11 @@ class Search:
 
 
 def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
-    """Add one effect after the other while the blocks left out get better, then try to drop."""
+    """Add one effect after the other while score and blocks left out get better, then drop.
+
+    An effect is added where it makes the score better by BETTER and the error of the blocks left
+    out smaller than without it.
+    """
     progress("parameters only")
     plain_fit = fit(sheet, (), record, sheet.machine, restarts=FIRST_RESTARTS)
     slow = 2.0 * np.pi / plain_fit.machine.load.frequency / record.period
@@ -62,32 +66,50 @@ def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> 
         return replace(tried, unseen=_unseen(sheet, tried.fitted, record, folds))
 
     plain = tested(Tried(plain_fit, _score(plain_fit.rms, independent, plain_fit.x.size)))
-    best = plain
     tried = [plain]
-    rivals: list[Tried] = []
-    while len(best.fitted.effects) < MOST_EFFECTS:
-        names = [name for name in REGISTRY if name not in best.fitted.effects]
-        progress(f"candidates beside: {best.fitted.name}")
-        round_ = [fitted((*best.fitted.effects, name), best.fitted, 0) for name in names]
-        round_.sort(key=lambda t: t.score)
-        for k, first in enumerate(round_[:MOST_FITTED]):
-            again = fitted(first.fitted.effects, best.fitted)
-            round_[k] = min(first, again, key=lambda t: t.score)
-        round_.sort(key=lambda t: t.score)
-        better = [t for t in round_ if t.score < best.score - BETTER][:MOST_TESTED]
-        held = [tested(t) for t in better]
-        tried += held + round_[len(held) :]
-        convincing = [t for t in held if t.unseen < best.unseen]
-        if not convincing:
-            break
-        best = convincing[0]
-        rivals = [t for t in convincing[1:] if _rivals(t, best)]
-    best = _dropped(best, fitted, tested, tried)
+    parents: dict[frozenset[str], Tried] = {}
+    accepted = [plain]
+    followed = [plain]
+    while followed and len(followed[0].fitted.effects) < MOST_EFFECTS:
+        found: dict[frozenset[str], Tried] = {}
+        for parent in followed:
+            progress(f"candidates beside: {parent.fitted.name}")
+            for child in _promising(parent, fitted):
+                same = frozenset(child.fitted.effects)
+                if same not in found or child.score < found[same].score:
+                    found[same] = child
+                    parents[same] = parent
+        better = sorted(found.values(), key=lambda t: t.score)
+        held = [tested(t) for t in better[:BREADTH]]
+        tried += held + better[BREADTH:]
+        followed = [t for t in held if t.unseen < parents[frozenset(t.fitted.effects)].unseen]
+        accepted += followed
+    best = _dropped(_smallest(accepted), fitted, tested, tried)
+    rivals = [t for t in accepted if _is_rival(t, best)]
     return Search(plain, best, tuple(tried), tuple(rivals))
 
 
-def _rivals(one: Tried, best: Tried) -> bool:
-    return one.score < best.score + BETTER and one.fitted.x.size <= best.fitted.x.size
+def _promising(parent: Tried, fitted: Callable[..., Tried]) -> list[Tried]:
+    """Return the candidates beside a set of effects that make the score better."""
+    names = [name for name in REGISTRY if name not in parent.fitted.effects]
+    first = [fitted((*parent.fitted.effects, name), parent.fitted, 0) for name in names]
+    first.sort(key=lambda t: t.score)
+    again = [fitted(t.fitted.effects, parent.fitted) for t in first[:MOST_FITTED]]
+    better = [min(pair, key=lambda t: t.score) for pair in zip(first, again, strict=False)]
+    return [t for t in better if t.score < parent.score - BETTER]
+
+
+def _smallest(accepted: list[Tried]) -> Tried:
+    """Return the one with the fewest parameters of those that are as good as the best."""
+    least = min(t.score for t in accepted)
+    good = [t for t in accepted if t.score < least + BETTER]
+    return min(good, key=lambda t: (t.fitted.x.size, t.score))
+
+
+def _is_rival(one: Tried, best: Tried) -> bool:
+    other = set(one.fitted.effects) != set(best.fitted.effects)
+    as_good = one.score < best.score + BETTER and one.fitted.x.size <= best.fitted.x.size
+    return other and as_good
 
 
 def _dropped(

@@ -9,6 +9,7 @@ from emir_analysis.diagnosis.actuator.result import (
     ActuatorDiagnosis,
     diagnosis,
     judged_runs,
+    noise_floor,
     stages,
     write_json,
 )
@@ -47,7 +48,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     signal_map = read_signal_map(signals)
     progress(f"reading {bag}")
     record = open_record(bag, signal_map)
-    found = search(sheet, record, progress)
+    found = search(sheet, record, noise_floor(sheet, record), progress)
     machines = stages(sheet, found)
     if model_out is not None:  # frozen before the judge is opened
         write_actuator(model_out, replace(sheet, machine=found.chosen.fitted.machine))

@@ -10,14 +10,13 @@ import numpy as np
 from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run
 from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
-from emir_analysis.diagnosis.actuator.search import Search
+from emir_analysis.diagnosis.actuator.search import AT_NOISE, Search
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
 BALANCE = "oil"  # the only one that opening and pressure allow
-AT_NOISE = 1.1  # times the noise: free-run error of a model that lacks nothing
 EXPLAINED = 0.7  # of the error without effects, on blocks left out: half of its square
 INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
 NOT_TOLD = (
@@ -96,6 +95,11 @@ class ActuatorDiagnosis:
     judged_from_its_own_start: bool
 
 
+def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:
+    """Return the noise of the pressure: the data sheet's, or that which the recording shows."""
+    return sheet.machine.sensor.pressure_noise or noise_of(record.pressure)
+
+
 def stages(sheet: ActuatorSheet, found: Search) -> dict[str, Actuator]:
     """Return the machine as stated, re-fitted, and with the effects that were chosen."""
     return {
@@ -130,7 +134,7 @@ def diagnosis(
     runs: dict[str, Array],
 ) -> ActuatorDiagnosis:
     """Put the findings into numbers; runs: as `judged_runs` returns them."""
-    noise = sheet.machine.sensor.pressure_noise or noise_of(record.pressure)
+    noise = noise_floor(sheet, record)
     judged = record if judge is None else judge
     errors = {name: _rms(run - judged.pressure) for name, run in runs.items()}
     chosen = found.chosen.fitted

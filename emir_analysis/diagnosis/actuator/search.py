@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.actuator.fitting import Fitted, Mask, fit, free_run
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
+AT_NOISE = 1.1  # times the noise: free-run error of a model that lacks nothing
 FOLDS = 4  # each leaves every fourth block out
 BLOCK = 1.25  # slow periods in a block, so that it is not known from its neighbours
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
@@ -45,11 +46,13 @@ class Search:
     rivals: tuple[Tried, ...]
 
 
-def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
+def search(
+    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, progress: Progress
+) -> Search:
     """Add one effect after the other while score and blocks left out get better, then drop.
 
     An effect is added where it makes the score better by BETTER and the error of the blocks left
-    out smaller than without it.
+    out smaller than without it. noise: of the pressure; a model that is down to it lacks nothing.
     """
     progress("parameters only")
     plain_fit = fit(sheet, (), record, sheet.machine, restarts=FIRST_RESTARTS)
@@ -70,7 +73,11 @@ def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> 
     parents: dict[frozenset[str], Tried] = {}
     accepted = [plain]
     followed = [plain]
-    while followed and len(followed[0].fitted.effects) < MOST_EFFECTS:
+    while (
+        followed
+        and len(followed[0].fitted.effects) < MOST_EFFECTS
+        and min(t.unseen for t in followed) > AT_NOISE * noise
+    ):
         found: dict[frozenset[str], Tried] = {}
         for parent in followed:
             progress(f"candidates beside: {parent.fitted.name}")
@@ -92,7 +99,7 @@ def search(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> 
 def _promising(parent: Tried, fitted: Callable[..., Tried]) -> list[Tried]:
     """Return the candidates beside a set of effects that make the score better."""
     names = [name for name in REGISTRY if name not in parent.fitted.effects]
-    first = [fitted((*parent.fitted.effects, name), parent.fitted, 0) for name in names]
+    first = [fitted((*parent.fitted.effects, name), parent.fitted, 1) for name in names]
     first.sort(key=lambda t: t.score)
     again = [fitted(t.fitted.effects, parent.fitted) for t in first[:MOST_FITTED]]
     better = [min(pair, key=lambda t: t.score) for pair in zip(first, again, strict=False)]

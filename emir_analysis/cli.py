@@ -17,11 +17,16 @@ USAGE = """usage: emir COMMAND ...
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
-  analyze    figures and pictures of a recording of the graph
+  view       a recording or the running graph as a page in the browser: arm, pressures, valve
+  analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
+  limit      the smallest deflection of the TCP that any command could reach for a move
+  yardstick  controllers against that limit, over random draws of the machine
   design     a predictive controller for a machine, and where it is stable
+  linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
@@ -36,11 +41,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "info": _info,
         "bag": _bag,
         "replay": _replay,
+        "view": _view,
         "analyze": _analyze,
         "compare": _compare,
+        "limit": _limit,
+        "yardstick": _yardstick,
         "design": _design,
+        "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "blind": _blind,
         "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
@@ -166,20 +176,30 @@ def _replay(words: list[str]) -> int:
     return 0 if changed or same(fields) else 1
 
 
+def _view(words: list[str]) -> int:
+    from emir_analysis.view.command import command
+
+    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
+
+
 def _analyze(words: list[str]) -> int:
-    from emir_analysis.run_report import analyze, text, write_json, write_report
+    from emir_analysis import run_report
 
     parser = argparse.ArgumentParser(prog="emir analyze")
-    parser.add_argument("bag", type=Path, help="a recording of the graph")
+    parser.add_argument("bag", type=Path, nargs="+", help="recordings of the graph")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
-    run = analyze(options.bag)
-    print(text(run))
-    if options.json:
-        write_json(run, options.json)
-    if options.html:
-        write_report(run, options.html)
+    runs = [run_report.analyze(bag) for bag in options.bag]
+    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
+    for file, write in (
+        (options.json, run_report.write_json),
+        (options.csv, run_report.write_csv),
+        (options.html, run_report.write_report),
+    ):
+        if file:
+            write(runs, file)
     return 0
 
 
@@ -199,6 +219,20 @@ def _compare(words: list[str]) -> int:
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _limit(words: list[str]) -> int:
+    from emir_analysis.limit_command import command
+
+    print(command(words))
+    return 0
+
+
+def _yardstick(words: list[str]) -> int:
+    from emir_analysis.yardstick_command import command
+
+    print(command(words, _progress))
     return 0
 
 
@@ -242,6 +276,13 @@ def _bench(words: list[str]) -> int:
     return 0
 
 
+def _linearize(words: list[str]) -> int:
+    from emir_analysis.linearize_command import command
+
+    print(command(words))
+    return 0
+
+
 def _figures(words: list[str]) -> int:
     from emir_analysis.paper_figures import FIGURES, draw
 
@@ -280,6 +321,13 @@ def _diagnose(words: list[str]) -> int:
         return 0
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
+    return 0
+
+
+def _blind(words: list[str]) -> int:
+    from emir_analysis.blind.command import arguments, command
+
+    print(command(arguments(words), _progress))
     return 0
 
 

@@ -17,11 +17,13 @@ from emir_analysis.node_controls import (
     NodeControl,
     PfcControl,
     PfcTipControl,
+    Stepping,
     TrajectoryControl,
 )
 from emir_analysis.replay_plant import replay_plant
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
+from emir_analysis.switching import Ready
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -30,13 +32,18 @@ from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.pfc import Pfc, PfcParameters
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_msgs_py.topics import CONTROL_PERIOD_NS
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    OFFERED_COMMANDS,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+)
 
 Values = dict[str, Any]
 
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
-OF_EVERY_NODE = ("lockstep", "input_timeout")  # parameters of the node, not of its controller
+OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -52,18 +59,25 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
         return replay_plant(bag, changed)
     about = bags.metadata(bag).get("emir", {})
     control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
+    law: Stepping = control
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
-    there = bags.recorded_topics(bag)
-    kept = tuple(topic for topic in control.outputs if full_name(topic, there))
-    outputs = by_stamp(bag, kept or control.outputs, CONTROL_PERIOD_NS)
+    there, answers = bags.recorded_topics(bag), control.outputs
+    offered = OFFERED_COMMANDS.get(node)
+    if offered and full_name(offered, there):  # one of several: it heard what was applied
+        law = Ready(node, control)
+        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
+            inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
+        answers = tuple(offered if topic is VELOCITY_COMMAND else topic for topic in answers)
+    kept = tuple(topic for topic in answers if full_name(topic, there))
+    outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
     state, rows = None, []
     for stamp, signals in sorted(inputs.items()):
-        state, answer = control.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
+        state, answer = law.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
         if stamp in outputs:
             rows.append((outputs[stamp], answer))
     if not rows:
         raise InputError(f"{bag}: no control period with all topics of {node}: not in lock step?")
-    return compared(control.outputs, rows)
+    return compared(answers, rows)
 
 
 def text(fields: list[FieldComparison], changed: Mapping[str, Any]) -> str:

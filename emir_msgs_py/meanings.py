@@ -1,6 +1,6 @@
 """What each signal of the topic table means, in words; recordings carry it beside path and unit."""
 
-from emir_msgs_py.topics import Topic
+from emir_msgs_py.topics import OUTER_LOOPS, Topic
 
 MEANINGS = {
     "angle": "joint angle alpha_1, measured by the resolver",
@@ -49,6 +49,9 @@ PFC_MEANINGS = {
 MEANINGS |= {
     f"{name}_{term}": text for name in ("pfc", "pfc_tip") for term, text in PFC_MEANINGS.items()
 }
+MEANINGS |= {f"{name}_command": f"piston velocity that {name} asks for" for name in OUTER_LOOPS}
+MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in OUTER_LOOPS}
+MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
 
 
 def field_table(topic: Topic) -> dict[str, dict[str, str]]:

@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -30,9 +29,11 @@ from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros import qos
+from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
+from emir_ros.wire import Wire, stamp_ns
 
 OUTPUTS = [
     JOINT_STATES,
@@ -56,7 +57,7 @@ class PlantNodeParameters:
     )
     duration: float = quantity("s", 0.0, 1e6, "simulated time; 0: without end", default=0.0)
     command_timeout: float = quantity(
-        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.064
+        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.056
     )
     patience: float = quantity(
         "s", 0.1, 3600.0, "how long lock step waits for an answer", default=30.0
@@ -87,7 +88,8 @@ class PlantNode(Shell):
         self._recorded = -1
         profile = qos.requested(VALVE_COMMAND, lockstep=self.lockstep)
         kind = conversions.message_class(VALVE_COMMAND.type)
-        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile)
+        self._command_wire = Wire(VALVE_COMMAND)
+        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile, raw=True)
         if self.lockstep:
             self._start_lockstep()
         else:
@@ -188,18 +190,18 @@ class PlantNode(Shell):
         if self._command is None:
             return 0.0
         if time.monotonic() - self._command_received > self.own.command_timeout:
-            self.get_logger().warning(
-                f"no fresh {VALVE_COMMAND.name}: valve shut", throttle_duration_sec=2.0
-            )
+            self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {VALVE_COMMAND.name}")
             return 0.0
         return self._command[1]
 
-    def _on_command(self, message: Any) -> None:
-        command = conversions.values(VALVE_COMMAND, message)["valve_command"]
+    def _on_command(self, data: bytes) -> None:
+        command = self._command_wire.decode(data)["valve_command"]
         if not math.isfinite(command):
-            self.get_logger().error(f"{VALVE_COMMAND.name} is {command}: valve shut")
+            self.diagnostics.say(Level.ERROR, f"valve shut: {VALVE_COMMAND.name} is {command}")
             command = 0.0
-        self._command = (conversions.stamp_ns(message), command)
+        else:
+            self.diagnostics.say(Level.OK, "running")
+        self._command = (stamp_ns(data), command)
         self._command_received = time.monotonic()
         if self.lockstep:
             self._advance_when_answered()

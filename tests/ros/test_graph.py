@@ -24,12 +24,15 @@ from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.info import info, parameters_text
+from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
 from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
 from emir_analysis.stamped import same
+from emir_analysis.switching import Switch, SwitchedLoop
 from emir_control import pfc_file
+from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
@@ -103,6 +106,39 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
     for node in ("trajectory", controller, "force_loop", "plant"):
+        assert same(replay(bag, node, {})), node
+
+
+def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path) -> None:
+    files = []
+    for name in ("first", "second"):
+        bag = tmp_path / name / "run"
+        words = ["--controller", "cascade", "--switch", "2.5=pfc", "--switch", "3.6=pfc_tip"]
+        assert run_graph([*words, "--duration", str(DURATION), "--bag", str(bag)]) == 0
+        files.append((bag / "run_0.mcap").read_bytes())
+    assert files[0] == files[1]
+    controls = {
+        "cascade": CascadeControl(Cascade(CascadeParameters())),
+        "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+        "pfc_tip": PfcTipControl(
+            Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
+        ),
+    }
+    switches = (Switch(0.0, "cascade"), Switch(2.5, "pfc"), Switch(3.6, "pfc_tip"))
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
+    expected = loop.run(math.pi / 4, 2e6, DURATION)
+    recorded = _read_with_rosbags(bag)
+    plan = Plan(bag=bag, controller="cascade", switches=switches[1:])
+    assert recorded.keys() == {f"/{name}" for name in plan.topics}
+    for topic in map(by_name, plan.topics):
+        for name in topic.fields:
+            values = [
+                conversions.values(topic, message)[name]
+                for _, message in recorded[f"/{topic.name}"]
+            ]
+            assert np.array_equal(values, expected[name]), name
+    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop"):
         assert same(replay(bag, node, {})), node
 
 
@@ -225,6 +261,9 @@ BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
+    "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
+    "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),
+    "switch order": (["--switch", "2=pfc", "--switch", "1=cascade"], "", "have to rise from 0 s"),
     "range": (
         [],
         "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}",

@@ -25,6 +25,7 @@ from emir_msgs_py.topics import (
     TRUTH,
     VALVE_COMMAND,
 )
+from emir_plant.parameters import cautions
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
@@ -76,6 +77,8 @@ class PlantNode(Shell):
         sheet = declare(self, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
         base = load_sheet(Path(sheet)).machine if sheet else joint1()
         self.plant = Plant(declare_tree(self, base))
+        for line in cautions(self.plant.machine):
+            self.get_logger().warning(line)
         self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
         reject_unknown(self)
         start = self.own.initial_angle, self.own.initial_pressure_lowering

@@ -316,7 +316,8 @@ def _figures(words: list[str]) -> int:
 
 
 def _diagnose(words: list[str]) -> int:
-    from emir_analysis.diagnosis import command, summary
+    from emir_analysis.diagnosis import actuator, command, summary
+    from emir_plant.actuator import is_actuator
 
     parser = argparse.ArgumentParser(prog="emir diagnose")
     parser.add_argument("bag", type=Path, help="the recording to find out from")
@@ -326,6 +327,12 @@ def _diagnose(words: list[str]) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
     o = parser.parse_args(words)
+    if is_actuator(o.datasheet):
+        found = actuator.command(
+            o.bag, o.datasheet, o.signals, o.judge, json=o.json, html=o.html, progress=_progress
+        )
+        print(actuator.summary(found))
+        return 0
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
     return 0

@@ -38,7 +38,11 @@ Array = NDArray[np.float64]
 Values = dict[str, Any]
 
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop")
-OF_EVERY_NODE = ("lockstep", "input_timeout")  # parameters of the node, not of its controller
+OF_EVERY_NODE = (
+    "lockstep",
+    "model",
+    "input_timeout",
+)  # parameters of the node, not of its controller
 
 
 @dataclass(frozen=True)

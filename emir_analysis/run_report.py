@@ -12,10 +12,16 @@ from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
 from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
-from emir_analysis.run_signals import load_run
+from emir_analysis.robot_metrics import robot_metrics
+from emir_analysis.robot_report import joints_picture, tcp_picture
+from emir_analysis.run_signals import is_robot, load_run
 from emir_analysis.signals import Recording
 
-SHOWN = {"m": ("cm", 100.0), "Pa": ("bar", 1e-5)}  # how people in the field read them
+SHOWN = {
+    "m": ("cm", 100.0),
+    "Pa": ("bar", 1e-5),
+    "rad": ("deg", math.degrees(1.0)),
+}  # how people in the field read them
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,8 @@ class RunAnalysis:
 def analyze(bag: Path) -> RunAnalysis:
     """Compute the figures of a recording of the graph. Raises InputError as `load_run`."""
     recording = load_run(bag)
-    return RunAnalysis(bag, bags.metadata(bag).get("emir", {}), recording, metrics(recording))
+    figures = robot_metrics(recording) if is_robot(recording) else metrics(recording)
+    return RunAnalysis(bag, bags.metadata(bag).get("emir", {}), recording, figures)
 
 
 def text(run: RunAnalysis) -> str:
@@ -62,15 +69,34 @@ def write_report(run: RunAnalysis, file: Path) -> None:
     """Write the HTML report. Raises InputError when that fails."""
     figures = [(m.name, *_shown(m), m.meaning) for m in run.metrics]
     blocks: list[Block] = [
-        Text(_headline(run), lead=True),
-        Picture(_motion(run.recording), "Piston and TCP. The paper's Fig. 9 shows these two."),
-        Picture(_hydraulics(run.recording), "Valve, chamber pressures and safety logic block."),
+        *(_robot_pictures(run) if is_robot(run.recording) else _joint1_pictures(run)),
         Heading("Figures"),
         Table(("figure", "value", "unit", "meaning"), figures),
         Heading("About this recording"),
         Table(("", ""), list(run.about.items())) if run.about else Text("It says nothing."),
     ]
     write_html(file, f"EMIR run: {run.bag.name}", blocks)
+
+
+def _joint1_pictures(run: RunAnalysis) -> list[Block]:
+    return [
+        Text(_headline(run), lead=True),
+        Picture(_motion(run.recording), "Piston and TCP. The paper's Fig. 9 shows these two."),
+        Picture(_hydraulics(run.recording), "Valve, chamber pressures and safety logic block."),
+    ]
+
+
+def _robot_pictures(run: RunAnalysis) -> list[Block]:
+    by_name = {m.name: " ".join(_shown(m)) for m in run.metrics}
+    return [
+        Text(
+            f"The TCP stays within {by_name['tcp_path_error_peak']} of its path and ends"
+            f" {by_name['tcp_error_end']} and {by_name['tcp_tilt_end']} from its reference.",
+            lead=True,
+        ),
+        Picture(tcp_picture(run.recording), "The TCP: error, deflection and turn by bending."),
+        Picture(joints_picture(run.recording), "All joints, the base first."),
+    ]
 
 
 def _shown(metric: Metric) -> tuple[str, str]:

@@ -12,6 +12,7 @@ from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
 
 GRAVITY = 9.81  # m/s^2
+LARGEST_PAYLOAD = 1500.0  # kg, paper 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,3 +131,11 @@ def groups(machine: Machine) -> dict[str, Any]:
     for effect in dataclasses.fields(effects):
         found[f"effects.{effect.name}"] = getattr(effects, effect.name)
     return found
+
+
+def overload(machine: Machine) -> str | None:
+    """Return one line about a payload beyond what the machine is made for; None within."""
+    payload = machine.geometry.payload + machine.effects.payload.mass
+    if payload <= LARGEST_PAYLOAD:
+        return None
+    return f"geometry.payload: {payload:g} kg in all, more than the {LARGEST_PAYLOAD:g} kg of EMIR"

@@ -10,12 +10,17 @@ from typing import Any
 
 import yaml
 
-from emir_common.parameter_tree import with_values
+from emir_analysis.robot_setup import Posture, path_parameters, trajectory
+from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 from emir_common.yaml_file import read_map
+from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_msgs_py.topics import TOPICS
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
+from emir_msgs_py.topics import JOINT1, ROBOT, TOPICS
+from emir_plant.robot import require_pinocchio
+from emir_plant.robot.sheet import robot
 
 CONTROLLERS = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
@@ -25,6 +30,10 @@ NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes), "plant_node")
 ))  # fmt: skip
 EVERY_NODE = "/**"
+MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
+OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout")
+ROBOT_FILES = ("robot_file", "machine_file")
+ROBOT_CONTROLLERS = ("cascade",)
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Plan:
     """What a run of the graph shall do.
 
     controller: a key of CONTROLLERS. duration: s; None: as long as the trajectory takes.
-    params: ROS 2 parameter file, or None.
+    params: ROS 2 parameter file, or None. model: a key of MODELS.
     """
 
     bag: Path
@@ -41,6 +50,7 @@ class Plan:
     duration: float | None = None
     params: Path | None = None
     lockstep: bool = True
+    model: str = JOINT1
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -50,13 +60,21 @@ class Plan:
     @property
     def topics(self) -> tuple[str, ...]:
         """Return the names of the topics that these nodes publish, in the table's order."""
-        return tuple(t.name for t in TOPICS if not set(t.publishers).isdisjoint(self.nodes))
+        table = MODELS[self.model]
+        return tuple(t.name for t in table if not set(t.publishers).isdisjoint(self.nodes))
 
 
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
     if plan.controller not in CONTROLLERS:
         raise ParameterError(f"controller {plan.controller!r}: there are {', '.join(CONTROLLERS)}")
+    if plan.model not in MODELS:
+        raise ParameterError(f"model {plan.model!r}: there are {', '.join(MODELS)}")
+    if plan.model == ROBOT:
+        require_pinocchio()
+        if plan.controller not in ROBOT_CONTROLLERS:
+            known = ", ".join(ROBOT_CONTROLLERS)
+            raise ParameterError(f"controller {plan.controller!r}: the whole robot has {known}")
     if plan.bag.exists():
         raise ParameterError(f"{plan.bag}: exists already, and is not overwritten")
     if plan.duration is not None and not 0.0 < plan.duration < float("inf"):
@@ -70,15 +88,41 @@ def check(plan: Plan) -> None:
 
 
 def duration(plan: Plan) -> float:
-    """Return how long the run takes, s."""
-    given = read_parameters(plan.params).get("trajectory_node", {})
-    own = {key: value for key, value in given.items() if key not in ("trajectory", "lockstep")}
+    """Return how long the run takes, s. Raises ParameterError for a trajectory that cannot be."""
+    given = read_parameters(plan.params)
+    own = {k: v for k, v in given.get("trajectory_node", {}).items() if k not in OF_EVERY_NODE}
+    where = f"{plan.params}: trajectory_node: " if own else ""
     try:
-        trajectory = named(plan.trajectory, with_values(TrajectoryParameters(), own))
+        if plan.model == ROBOT:
+            takes = _robot_trajectory(plan, given, own)
+        else:
+            takes = _trajectory(plan, own)
     except ParameterError as error:
-        where = f"{plan.params}: trajectory_node: " if own else ""
         raise ParameterError(f"{where}{error}") from None
-    return trajectory.duration if plan.duration is None else plan.duration
+    return takes if plan.duration is None else plan.duration
+
+
+def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
+    """Return how long joint 1's trajectory takes, s."""
+    return named(plan.trajectory, with_values(TrajectoryParameters(), own)).duration
+
+
+def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
+    """Return how long the robot's trajectory takes, s, from where it is to start."""
+    files = (Path(name) if name else None for name in (own.pop(key, "") for key in ROBOT_FILES))
+    sheet = robot(*files)
+    path = path_parameters(sheet)
+    of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
+    move = with_values(TrajectoryParameters(), own)
+    planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
+    front = "initial_angles."
+    angles = {
+        name.removeprefix(front): value
+        for name, value in given.get("plant_node", {}).items()
+        if name.startswith(front)
+    }
+    start = RobotTrajectoryInputs(with_values(Posture(), angles).angles)
+    return planned.initial(start).timing.duration
 
 
 def read_parameters(file: Path | None) -> dict[str, dict[str, Any]]:
@@ -119,7 +163,7 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
 
 def _run_parameters(plan: Plan) -> dict[str, Any]:
     nodes = {
-        EVERY_NODE: {"lockstep": plan.lockstep},
+        EVERY_NODE: {"lockstep": plan.lockstep, "model": plan.model},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
         "trajectory_node": {"trajectory": plan.trajectory},
         "recorder_node": {
@@ -137,6 +181,7 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
 def _description(plan: Plan) -> dict[str, str]:
     return {
         "software": f"emir {software_version()}",
+        "model": plan.model,
         "controller": plan.controller,
         "trajectory": plan.trajectory,
         "duration": f"{duration(plan):g} s",

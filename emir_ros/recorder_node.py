@@ -16,10 +16,12 @@ from std_msgs.msg import Header
 from emir_analysis.rosbag2_writer import Rosbag2Writer, channel_metadata
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     PLANT_PERIOD_NS,
     RECORDED,
+    ROBOT,
     TOPICS,
     Topic,
     by_name,
@@ -37,15 +39,16 @@ class RecorderNode(Shell):
     """Every topic of the table (or those named) -> recording, recorder/recorded."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("recorder_node", [], arguments)
-        everything = [topic.name for topic in TOPICS]
+        super().__init__("recorder_node", [], arguments, [])
+        self._table = ROBOT_TOPICS if self.model == ROBOT else TOPICS
+        everything = [topic.name for topic in self._table]
         folder: str = declare(self, "bag", "", "folder of the recording, must not exist")
         names: list[str] = declare(self, "topics", everything, "topics to record")
         about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
         reject_unknown(self)
         if not folder:
             raise ParameterError("recorder_node: bag: the folder of the recording is missing")
-        self._topics = [_known(name) for name in names]
+        self._topics = [_known(name, self._table) for name in names]
         self._writer = Rosbag2Writer(Path(folder))
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
@@ -108,9 +111,9 @@ class RecorderNode(Shell):
         self._ack.publish(message)
 
 
-def _known(name: str) -> Topic:
+def _known(name: str, table: tuple[Topic, ...]) -> Topic:
     try:
-        return by_name(name)
+        return by_name(name, table)
     except KeyError:
         raise ParameterError(f"recorder_node: topics: {name!r} is not a topic of EMIR") from None
 

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from emir_analysis.node_controls import NodeControl
+from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT1, PLANT_PERIOD_NS, ROBOT, Topic
 from emir_ros import qos
 from emir_ros.node_parameters import declare
 
@@ -27,19 +29,30 @@ class NodeError(RuntimeError):
 
 
 class Shell(Node):
-    """A node with the graph's common parameter `lockstep` and its publishers.
+    """A node with the graph's common parameters `lockstep` and `model`, and its publishers.
 
-    arguments: ROS arguments of this node alone, beside those of the process.
+    outputs: of joint 1's model. robot: those of the whole robot's, where the node knows that.
+    arguments: ROS arguments of this node alone, beside those of the process. Raises
+    ParameterError for a model that the node does not know.
     """
 
     def __init__(
-        self, name: str, outputs: Sequence[Topic], arguments: Sequence[str] | None = None
+        self,
+        name: str,
+        outputs: Sequence[Topic],
+        arguments: Sequence[str] | None = None,
+        robot: Sequence[Topic] | None = None,
     ) -> None:
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
+        known = {JOINT1: outputs} | ({} if robot is None else {ROBOT: robot})
+        self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
+        if self.model not in known:
+            raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
         self._outputs = {
-            topic.name: (topic, self._publisher(topic.type, topic.name)) for topic in outputs
+            topic.name: (topic, self._publisher(topic.type, topic.name))
+            for topic in known[self.model]
         }
 
     def _publisher(self, type_name: str, name: str) -> Any:
@@ -58,7 +71,9 @@ class Shell(Node):
 class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
-    A subclass implements `control`; `stale` says what to do without fresh inputs.
+    A subclass implements `control`; `stale` says what to do without fresh inputs. It acts as
+    often as its first output is to come. robot: whose inputs and outputs it has when the model
+    is the whole robot.
     """
 
     def __init__(
@@ -67,9 +82,15 @@ class ControlNode(Shell):
         inputs: Sequence[Topic],
         outputs: Sequence[Topic],
         arguments: Sequence[str] | None = None,
+        robot: type[NodeControl] | None = None,
     ) -> None:
-        super().__init__(name, outputs, arguments)
+        super().__init__(name, outputs, arguments, None if robot is None else robot.outputs)
+        if robot is not None and self.model == ROBOT:
+            inputs, outputs = robot.inputs, robot.outputs
+        fast = outputs[0].every == "plant"
+        self._period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
         self._inputs = {topic.name: topic for topic in inputs}
+        self._held: dict[str, Signals] = {}  # what comes less often than this node acts
         self._timeout = Duration(
             seconds=declare(self, "input_timeout", 0.1, "an older input is stale [s], real time")
         )
@@ -78,7 +99,7 @@ class ControlNode(Shell):
         for topic in inputs:
             self._subscribe(topic)
         if not self.lockstep:
-            self.create_timer(CONTROL_PERIOD_NS * 1e-9, self._on_timer)
+            self.create_timer(self._period * 1e-9, self._on_timer)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the output signals of one control period of dt, s."""
@@ -90,24 +111,31 @@ class ControlNode(Shell):
 
     def _subscribe(self, topic: Topic) -> None:
         def receive(message: Any) -> None:
-            signals = conversions.values(topic, message)
             if self.lockstep:
-                self._on_stamp(topic, conversions.stamp_ns(message), signals)
+                self._on_stamp(topic, message)
             else:
+                signals = conversions.values(topic, message)
                 self._latest[topic.name] = (self.get_clock().now(), signals)
 
         kind = conversions.message_class(topic.type)
         profile = qos.requested(topic, lockstep=self.lockstep)
         self.create_subscription(kind, topic.name, receive, profile)
 
-    def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
-        if stamp % CONTROL_PERIOD_NS:
+    def _on_stamp(self, topic: Topic, message: Any) -> None:
+        stamp = conversions.stamp_ns(message)
+        if stamp % self._period:
             return
         complete = self._pending.setdefault(stamp, {})
-        complete[topic.name] = signals
-        if len(complete) == len(self._inputs):
+        complete[topic.name] = conversions.values(topic, message)
+        if len(complete) == self._expected(stamp):
             self._pending = {s: rest for s, rest in self._pending.items() if s > stamp}
-            self._run(stamp, complete.values())
+            self._held |= complete
+            self._run(stamp, self._held.values())
+
+    def _expected(self, stamp: int) -> int:
+        """Return how many of the inputs have messages of that stamp."""
+        controlled = stamp % CONTROL_PERIOD_NS == 0
+        return sum(controlled or topic.every == "plant" for topic in self._inputs.values())
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()
@@ -128,7 +156,7 @@ class ControlNode(Shell):
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
-        self._publish_all(stamp, self.control(signals, CONTROL_PERIOD_NS * 1e-9))
+        self._publish_all(stamp, self.control(signals, self._period * 1e-9))
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
         for topic, _ in self._outputs.values():

@@ -80,7 +80,7 @@ class RobotCascadeControl:
 class RobotForceLoopControl:
     """force_loop_node: force feedback and prefilter of every joint."""
 
-    inputs: ClassVar[Topics] = (ROBOT_VELOCITY_COMMAND, PRESSURES)
+    inputs: ClassVar[Topics] = (ROBOT_VELOCITY_COMMAND, ROBOT_CYLINDER_STATES, PRESSURES)
     outputs: ClassVar[Topics] = (ROBOT_FORCE_LOOP_TERMS, ROBOT_VALVE_COMMAND)
     parameters: RobotForceLoopParameters
 
@@ -96,6 +96,7 @@ class RobotForceLoopControl:
                 0.0,
                 signals[f"{joint}_pressure_lifting"],
                 signals[f"{joint}_pressure_lowering"],
+                signals[f"{joint}_stroke"],
             )
             own = state[joint] if state else loop.initial(inputs)
             after[joint], shown = loop.step(own, inputs, dt)

@@ -1,59 +1,73 @@
-"""Pictures of a run of the whole robot."""
+"""The plots of runs of the whole robot."""
+
+from collections.abc import Mapping
 
 import numpy as np
-from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from emir_analysis.report import new_figure
-from emir_analysis.robot_metrics import (
-    best,
-    deflection,
-    joint_error,
-    path_error,
-    rotation,
-    tcp_error,
-)
-from emir_analysis.signals import Recording
+from emir_analysis.report import Block, Plot
+from emir_analysis.robot_metrics import joint_error, path_error, tcp_error
+from emir_analysis.run_plots import Line, Row, plot
+from emir_analysis.signals import Recording, Signal
 from emir_msgs_py.robot_topics import JOINTS
 
+Array = NDArray[np.float64]
 
-def tcp_picture(run: Recording) -> Figure:
-    """Return how well the TCP follows and how it is bent."""
-    figure = new_figure(7.0)
-    follows, bent, turned = figure.subplots(3, 1, sharex=True)
+DASHES = ("solid", "dash", "dot")
+DEGREES = float(np.degrees(1.0))
+TCP = (
+    Row("TCP error / cm", (
+        Line(("tcp_error",), "from the reference, with its lag", 1e2, "dot"),
+        Line(("path_error",), "from the path", 1e2),
+    )),
+    Row("deflection / cm", tuple(
+        Line((f"deflection_{axis}",), f"deflection {axis}", 1e2, dash)
+        for axis, dash in zip("xyz", DASHES, strict=True)
+    )),
+    Row("rotation / deg", tuple(
+        Line((f"deflection_about_{axis}",), f"turned about {axis}", DEGREES, dash)
+        for axis, dash in zip("xyz", DASHES, strict=True)
+    )),
+)  # fmt: skip
+ERRORS = tuple(
+    Row(f"{joint} / {'mrad' if joint == 'base' else 'mm'}", (
+        Line((f"{joint}_error",), f"{joint}, stroke less reference", 1e3),
+    ))
+    for joint in JOINTS
+)  # fmt: skip
+PRESSURES = tuple(
+    Row(f"{joint} / bar", (
+        Line((f"{joint}_true_pressure_lifting", f"{joint}_pressure_lifting"),
+             f"{joint}, lifting chamber", 1e-5),
+        Line((f"{joint}_true_pressure_lowering", f"{joint}_pressure_lowering"),
+             f"{joint}, lowering chamber", 1e-5, "dash"),
+    ))
+    for joint in JOINTS
+)  # fmt: skip
+
+
+def robot_plots(runs: Mapping[str, Recording]) -> list[Block]:
+    """Return the plots of runs by name."""
+    derived = {name: with_errors(run) for name, run in runs.items()}
+    return [
+        Plot(plot(TCP, derived), "The TCP: error, deflection and turn by bending."),
+        Plot(plot(ERRORS, derived), "How each joint follows."),
+        Plot(plot(PRESSURES, derived), "Chamber pressures."),
+    ]
+
+
+def with_errors(run: Recording) -> Recording:
+    """Return the recording with the errors of TCP and joints as signals."""
     times = run["tcp_reference_x"].time
-    follows.plot(times, tcp_error(run) * 1e2, label="from the reference, lag included")
-    follows.plot(times, path_error(run) * 1e2, label="from the path")
-    follows.set_ylabel("TCP error / cm")
-    moving = run["deflection_x"].time
-    for axis, values, angles in zip("xyz", deflection(run), rotation(run), strict=True):
-        bent.plot(moving, values * 1e2, label=axis)
-        turned.plot(moving, np.degrees(angles), label=f"about {axis}")
-    bent.set_ylabel("deflection / cm")
-    turned.set_ylabel("rotation / deg")
-    return _finished(figure)
+    new = {"tcp_error": (tcp_error(run), "m"), "path_error": (path_error(run), "m")}
+    new |= {f"{j}_error": (joint_error(run, j), run[f"{j}_reference_stroke"].unit) for j in JOINTS}
+    errors = {name: Signal(name, times, value, unit) for name, (value, unit) in new.items()}
+    return Recording(run.signals | errors, run.start_ns)
 
 
-def joints_picture(run: Recording) -> Figure:
-    """Return error and chamber pressures of every joint."""
-    figure = new_figure(11.0)
-    for (error, pressure), joint in zip(figure.subplots(6, 2, sharex=True), JOINTS, strict=True):
-        reference = run[f"{joint}_reference_stroke"]
-        error.plot(reference.time, joint_error(run, joint) * 1e3)
-        error.set_ylabel(f"{joint} / {'mrad' if reference.unit == 'rad' else 'mm'}")
-        for side in ("lifting", "lowering"):
-            signal = run[best(run, joint, f"pressure_{side}")]
-            pressure.plot(signal.time, signal.value * 1e-5, label=side)
-        pressure.set_ylabel("bar")
-    figure.axes[0].set_title("stroke less reference", fontsize="medium")
-    figure.axes[1].set_title("chamber pressures", fontsize="medium")
-    figure.axes[-2].set_xlabel("time / s")
-    return _finished(figure)
-
-
-def _finished(figure: Figure) -> Figure:
-    for axes in figure.axes:
-        axes.grid(visible=True, alpha=0.3)
-        if len(axes.lines) > 1:
-            axes.legend(loc="upper right", frameon=False, fontsize="small", ncols=3)
-    figure.axes[-1].set_xlabel("time / s")
-    return figure
+def headline(shown: Mapping[str, str]) -> str:
+    """Return what there is to say first, from the figures as shown by name."""
+    return (
+        f"The TCP stays within {shown['tcp_path_error_peak']} of its path and ends"
+        f" {shown['tcp_error_end']} and {shown['tcp_tilt_end']} from its reference."
+    )

@@ -15,6 +15,7 @@ from emir_control.arm import JOINTS, Arm, ArmParameters
 from emir_control.cascade import CascadeParameters
 from emir_control.force_loop import ForceLoopParameters
 from emir_control.inverse import Ranges
+from emir_control.limits import LimitParameters
 from emir_control.prefilter import PrefilterParameters
 from emir_control.robot_trajectory import LineParameters, Linkage, RobotTrajectory
 from emir_control.trajectory import TrajectoryParameters
@@ -30,6 +31,7 @@ Array = NDArray[np.float64]
 # and high pass of 1 s the cascade would excite it. With these a single mode on the oil's spring
 # between 0.27 and 0.7 Hz keeps a damping of 0.2 of critical (docs/robot.md).
 GAIN = 0.7  # 1/s, k_p of law (11)
+ENDLESS = (-5.0, 5.0)  # rad, the base
 HIGH_PASS = 3.0  # s, T_H of (10)
 DAMPING_RATE = 3.0  # 1/s, at which the force loop lets a cylinder's oil relax
 
@@ -112,17 +114,17 @@ def force_loops(robot: Robot) -> RobotForceLoopParameters:
     Every gain makes the oil of its cylinder, at half stroke, relax at the same rate.
     """
     reaches = tuple(reach(shape) for shape in robot.linkages)
-    middles = (0.0, *(0.5 * (of.stroke_low + of.stroke_high) for of in reaches))
+    strokes = (ENDLESS, *((of.stroke_low, of.stroke_high) for of in reaches))
     return RobotForceLoopParameters(
         **{
-            name: _force_loop(machine, middle)
-            for name, machine, middle in zip(JOINTS, machines(robot, reaches), middles, strict=True)
+            name: _force_loop(machine, *ends)
+            for name, machine, ends in zip(JOINTS, machines(robot, reaches), strokes, strict=True)
         }
     )
 
 
-def _force_loop(machine: Machine, stroke: float) -> ForceLoopParameters:
-    c, v = machine.cylinder, machine.valve
+def _force_loop(machine: Machine, low: float, high: float) -> ForceLoopParameters:
+    c, v, stroke = machine.cylinder, machine.valve, 0.5 * (low + high)
     lifting = c.volume_lifting_0 + c.area_lifting * stroke
     lowering = c.volume_lowering_0 - c.area_lowering * stroke
     spring = c.beta * (c.area_lifting**2 / lifting + c.area_lowering**2 / lowering)
@@ -135,6 +137,9 @@ def _force_loop(machine: Machine, stroke: float) -> ForceLoopParameters:
             flow_lifting=v.flow_nominal,
             flow_lowering=v.flow_nominal * v.flow_ratio_lowering,
             dead_zone=v.dead_zone,
+        ),
+        limits=LimitParameters(
+            speed=1.1 * v.flow_nominal / c.area_lifting, stroke_low=low, stroke_high=high
         ),
     )
 
@@ -156,19 +161,22 @@ def path_parameters(robot: Robot) -> RobotPathParameters:
 def trajectory(
     robot: Robot, name: str, move: TrajectoryParameters, path: RobotPathParameters
 ) -> RobotTrajectory:
-    """Return the trajectory of that name. Raises ParameterError for an unknown name."""
+    """Return the trajectory of that name, off the ends of the strokes as the force loops are.
+
+    Raises ParameterError for an unknown name.
+    """
     reaches = tuple(reach(shape) for shape in robot.linkages)
     drives = machines(robot, reaches)
-    linkages: tuple[Linkage, ...] = (
-        Motor(), *(Cylinder(record(shape)[0]) for shape in robot.linkages)
-    )  # fmt: skip
+    cylinders = [Cylinder(record(shape)[0]) for shape in robot.linkages]
+    linkages: tuple[Linkage, ...] = (Motor(), *cylinders)
+    by_number, margin = list(zip(cylinders, reaches, strict=True)), LimitParameters().end_margin
     return RobotTrajectory(
         name=name,
         arm=Arm(path.arm),
         linkages=linkages,
         ranges=Ranges(
-            np.array([-math.pi, *(of.angle_low for of in reaches)]),
-            np.array([math.pi, *(of.angle_high for of in reaches)]),
+            np.array([-math.pi, *(c.angle(of.stroke_low + margin) for c, of in by_number)]),
+            np.array([math.pi, *(c.angle(of.stroke_high - margin) for c, of in by_number)]),
         ),
         fastest=np.array([m.valve.flow_nominal / m.cylinder.area_lifting for m in drives]),
         move=move,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import CascadeControl, NodeControl
+from emir_analysis.node_controls import CascadeControl, Stepping
 from emir_analysis.robot_controls import RobotCascadeControl
 from emir_analysis.robot_setup import cascade_parameters
 from emir_control.cascade import Cascade, CascadeParameters
@@ -17,12 +17,11 @@ class CascadeNode(ControlNode):
     """cylinder_reference, cylinder_states -> velocity_command, cascade/terms."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        mine = CascadeControl
-        super().__init__("cascade_node", mine.inputs, mine.outputs, arguments, RobotCascadeControl)
+        mine, six = CascadeControl, RobotCascadeControl
+        super().__init__("cascade_node", mine.inputs, mine.outputs, arguments, six)
         robot = self.model == ROBOT
-        usual = cascade_parameters() if robot else CascadeParameters()
-        law = Cascade(declare_tree(self, usual))
-        self.law: NodeControl = RobotCascadeControl(law) if robot else CascadeControl(law)
+        law = Cascade(declare_tree(self, cascade_parameters() if robot else CascadeParameters()))
+        self.law: Stepping = six(law) if robot else self.standing_by(mine(law))
         self.state: Any = None
         reject_unknown(self)
 
@@ -30,6 +29,10 @@ class CascadeNode(ControlNode):
         """Return command and terms of this control period."""
         self.state, outputs = self.law.step(self.state, signals, dt)
         return outputs
+
+    def stale(self, missing: Sequence[str]) -> None:
+        """Publish nothing, so that the valve shuts; the smoothing starts anew afterwards."""
+        self.state = None
 
 
 def main() -> None:

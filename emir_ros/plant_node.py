@@ -16,6 +16,7 @@ from emir_msgs_py import conversions
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, RECORDED, ROBOT
 from emir_ros import qos
+from emir_ros.diagnostics import Level
 from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachine
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
@@ -33,7 +34,7 @@ class PlantNodeParameters:
     )
     duration: float = quantity("s", 0.0, 1e6, "simulated time; 0: without end", default=0.0)
     command_timeout: float = quantity(
-        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.064
+        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.056
     )
     patience: float = quantity(
         "s", 0.1, 3600.0, "how long lock step waits for an answer", default=30.0
@@ -165,18 +166,19 @@ class PlantNode(Shell):
         if self._command is None:
             return self._shut
         if time.monotonic() - self._command_received > self.own.command_timeout:
-            self.get_logger().warning(
-                f"no fresh {self._valves.name}: valve shut", throttle_duration_sec=2.0
-            )
+            self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {self._valves.name}")
             return self._shut
         return self._command[1]
 
     def _on_command(self, message: Any) -> None:
         command = conversions.values(self._valves, message)
-        for name, value in command.items():
-            if not math.isfinite(value):
-                self.get_logger().error(f"{name} is {value}: valve shut")
-                command[name] = 0.0
+        bad = {name: value for name, value in command.items() if not math.isfinite(value)}
+        if bad:
+            told = ", ".join(f"{name} is {value}" for name, value in bad.items())
+            self.diagnostics.say(Level.ERROR, f"valve shut: {told}")
+            command |= dict.fromkeys(bad, 0.0)
+        else:
+            self.diagnostics.say(Level.OK, "running")
         self._command = (conversions.stamp_ns(message), command)
         self._command_received = time.monotonic()
         if self.lockstep:

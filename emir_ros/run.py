@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from rclpy.executors import ExternalShutdownException
 
 from emir_analysis.errors import InputError
 from emir_analysis.run_report import analyze, text
+from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
@@ -39,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         model=options.model,
     )
     try:
+        plan = replace(plan, switches=tuple(map(_switch, options.switch)))
         check(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
@@ -53,6 +56,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
     parser.add_argument("--model", default="joint1", help=", ".join(MODELS))
     parser.add_argument("--controller", default="cascade", help=", ".join(CONTROLLERS))
+    parser.add_argument(
+        "--switch", action="append", default=[], metavar="S=NAME",
+        help="to which controller at what time, while it moves; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--trajectory", default="lift-lower", help=TRAJECTORIES)
     parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
@@ -62,6 +69,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--processes", choices=("one", "many"), default="one")
     parser.add_argument("--bag", type=Path, required=True, metavar="DIR", help="the recording")
     return parser
+
+
+def _switch(words: str) -> Switch:
+    time, equals, name = words.partition("=")
+    try:
+        return Switch(float(time), name.strip() if equals else "")
+    except ValueError:
+        raise ParameterError(f"--switch {words}: not of the form S=NAME") from None
 
 
 def _run(plan: Plan, processes: str) -> int:

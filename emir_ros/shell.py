@@ -5,17 +5,29 @@ control period starts when all inputs with the stamp of that period are there, s
 runs as fast as it can and the result does not depend on how fast that is.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from emir_analysis.node_controls import NodeControl
+from emir_analysis.node_controls import NodeControl, Stepping
+from emir_analysis.switching import Ready
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT1, PLANT_PERIOD_NS, ROBOT, Topic
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    JOINT1,
+    OFFERED_COMMANDS,
+    PLANT_PERIOD_NS,
+    ROBOT,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+    Topic,
+)
 from emir_ros import qos
+from emir_ros.diagnostics import Diagnostics, Level
 from emir_ros.node_parameters import declare
 
 if TYPE_CHECKING:
@@ -50,10 +62,13 @@ class Shell(Node):
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
-        self._outputs = {
-            topic.name: (topic, self._publisher(topic.type, topic.name))
-            for topic in known[self.model]
-        }
+        self._outputs: dict[str, tuple[Topic, Any]] = {}
+        self._offer(known[self.model])
+        self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
+
+    def _offer(self, outputs: Sequence[Topic]) -> None:
+        for topic in outputs:
+            self._outputs[topic.name] = (topic, self._publisher(topic.type, topic.name))
 
     def _publisher(self, type_name: str, name: str) -> Any:
         kind = conversions.message_class(type_name)
@@ -71,10 +86,17 @@ class Shell(Node):
 class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
-    A subclass implements `control`; `stale` says what to do without fresh inputs. It acts as
-    often as its first output is to come. robot: whose inputs and outputs it has when the model
-    is the whole robot.
+    A subclass implements `control`; `stale` says what to do without fresh inputs. A command
+    that two nodes publish counts as missing: nobody knows which of them to obey. The node acts as
+    often as its first output is to come. robot: whose inputs and outputs it has when the model is
+    the whole robot.
+
+    A node that commands the piston's velocity has the parameter `standby`: it then offers its
+    command to selector_node, which tells it what was applied, and holds its state ready.
     """
+
+    consequence = "no output"  # of missing inputs, in words
+    timeout = 0.1  # s, by default, after which an input is stale
 
     def __init__(
         self,
@@ -84,22 +106,42 @@ class ControlNode(Shell):
         arguments: Sequence[str] | None = None,
         robot: type[NodeControl] | None = None,
     ) -> None:
-        super().__init__(name, outputs, arguments, None if robot is None else robot.outputs)
+        super().__init__(name, [], arguments, None if robot is None else [])
         if robot is not None and self.model == ROBOT:
             inputs, outputs = robot.inputs, robot.outputs
         fast = outputs[0].every == "plant"
         self._period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
-        self._inputs = {topic.name: topic for topic in inputs}
         self._held: dict[str, Signals] = {}  # what comes less often than this node acts
-        self._timeout = Duration(
-            seconds=declare(self, "input_timeout", 0.1, "an older input is stale [s], real time")
-        )
+        self._own = name.removesuffix("_node")
+        self._inputs: dict[str, Topic] = {}
+        about = "an older input is stale [s], real time"
+        self._timeout = Duration(seconds=declare(self, "input_timeout", self.timeout, about))
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
+        self._last_stamp = -1
         for topic in inputs:
-            self._subscribe(topic)
+            self.take(topic)
+        if self._own in OFFERED_COMMANDS:
+            about = "offer the command to selector_node and hold the state ready"
+            self._standby: bool = declare(self, "standby", False, about)
+            if self._standby:
+                outputs = [self._offered(topic) for topic in outputs]
+                self._hear_selector()
+        self._offer(outputs)
         if not self.lockstep:
             self.create_timer(self._period * 1e-9, self._on_timer)
+
+    def standing_by(self, control: NodeControl) -> Stepping:
+        """Return the controller as this node shall hold it: alone, or one of several."""
+        return Ready(self._own, control) if self._standby else control
+
+    def _offered(self, topic: Topic) -> Topic:
+        return OFFERED_COMMANDS[self._own] if topic is VELOCITY_COMMAND else topic
+
+    def _hear_selector(self) -> None:
+        """Take what was applied in the last period as an input; in the first there is none."""
+        self._pending[0] = {SELECTOR_TERMS.name: {}}
+        self.take(SELECTOR_TERMS, CONTROL_PERIOD_NS)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the output signals of one control period of dt, s."""
@@ -109,10 +151,17 @@ class ControlNode(Shell):
         """Return what to publish while inputs are missing or too old; None: nothing."""
         return None
 
-    def _subscribe(self, topic: Topic) -> None:
+    def needed(self) -> Collection[str]:
+        """Return the names of the inputs without which there is no period in real time."""
+        return self._inputs.keys() - {SELECTOR_TERMS.name}
+
+    def take(self, topic: Topic, later: int = 0) -> None:
+        """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
+        self._inputs[topic.name] = topic
+
         def receive(message: Any) -> None:
             if self.lockstep:
-                self._on_stamp(topic, message)
+                self._on_stamp(topic, message, later)
             else:
                 signals = conversions.values(topic, message)
                 self._latest[topic.name] = (self.get_clock().now(), signals)
@@ -121,14 +170,20 @@ class ControlNode(Shell):
         profile = qos.requested(topic, lockstep=self.lockstep)
         self.create_subscription(kind, topic.name, receive, profile)
 
-    def _on_stamp(self, topic: Topic, message: Any) -> None:
-        stamp = conversions.stamp_ns(message)
+    def _on_stamp(self, topic: Topic, message: Any, later: int) -> None:
+        stamp = conversions.stamp_ns(message) + later
         if stamp % self._period:
             return
         complete = self._pending.setdefault(stamp, {})
+        if topic.name in complete or stamp <= self._last_stamp:
+            raise NodeError(
+                f"{self.get_name()}: {topic.name} came twice for t = {stamp * 1e-9:.3f} s:"
+                " does more than one node publish it?"
+            )
         complete[topic.name] = conversions.values(topic, message)
         if len(complete) == self._expected(stamp):
-            self._pending = {s: rest for s, rest in self._pending.items() if s > stamp}
+            del self._pending[stamp]
+            self._last_stamp = stamp
             self._held |= complete
             self._run(stamp, self._held.values())
 
@@ -139,24 +194,50 @@ class ControlNode(Shell):
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()
-        missing = [
-            name
-            for name in self._inputs
-            if name not in self._latest or now - self._latest[name][0] > self._timeout
-        ]
+        missing = self.missing()
         if not missing:
-            self._run(now.nanoseconds, [signals for _, signals in self._latest.values()])
-            return
-        self.get_logger().warning(
-            f"no fresh {', '.join(missing)}", throttle_duration_sec=2.0, skip_first=True
-        )
+            fresh = [s for t, s in self._latest.values() if now - t <= self._timeout]
+            self._run(now.nanoseconds, fresh)
+        else:
+            self.without(missing)
+
+    def missing(self) -> list[str]:
+        """Return what keeps a period from running, in words; nothing: all is there."""
+        now = self.get_clock().now()
+        found = []
+        for name in self.needed():
+            if name not in self._latest:
+                found.append(f"no {name} yet")
+            elif now - self._latest[name][0] > self._timeout:
+                found.append(f"no fresh {name}")
+            elif self._inputs[name].quality == "command" and self.count_publishers(name) > 1:
+                found.append(f"more than one node publishes {name}")
+        return found
+
+    def without(self, missing: Sequence[str]) -> None:
+        """Do what is to be done in a period that cannot run, and say why."""
+        began = any(reason.endswith("yet") for reason in missing)
         instead = self.stale(missing)
+        what = f"{self.consequence}: " if instead is not None else ""
+        self.diagnostics.say(Level.WARN if began else Level.ERROR, what + ", ".join(missing))
         if instead is not None:
-            self._publish_all(now.nanoseconds, instead)
+            self._publish_all(self.get_clock().now().nanoseconds, instead)
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
         self._publish_all(stamp, self.control(signals, self._period * 1e-9))
+        bad = [name for name, value in signals.items() if not math.isfinite(value)]
+        if bad:
+            verb = "is" if len(bad) == 1 else "are"
+            self.diagnostics.say(
+                Level.ERROR, f"{self.consequence}: {', '.join(bad)} {verb} not a number"
+            )
+        else:
+            self.diagnostics.say(Level.OK, self.status())
+
+    def status(self) -> str:
+        """Return what there is to say while all is well."""
+        return "running"
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
         for topic, _ in self._outputs.values():

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from rclpy.node import Node
 
@@ -43,6 +43,7 @@ class Machine(Protocol):
     """What plant_node steps."""
 
     command: Topic
+    plant: Any
 
     def step(self, commands: Signals, dt: float) -> None:
         """Go on by dt, s, under the signals of the command topic."""

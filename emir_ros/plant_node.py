@@ -71,6 +71,11 @@ class PlantNode(Shell):
         else:
             self._start_realtime()
 
+    @property
+    def plant(self) -> Any:
+        """Return the simulated machine itself: Plant or RobotPlant."""
+        return self.machine.plant
+
     def _step(self, command: Signals) -> None:
         self.machine.step(command, PLANT_PERIOD_NS * 1e-9)
         self.tick += 1

@@ -20,9 +20,13 @@ USAGE = """usage: emir COMMAND ...
   view       a recording or the running graph as a page in the browser: arm, pressures, valve
   analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
+  limit      the smallest deflection of the TCP that any command could reach for a move
+  yardstick  controllers against that limit, over random draws of the machine
   design     a predictive controller for a machine, and where it is stable
+  linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
@@ -40,9 +44,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "view": _view,
         "analyze": _analyze,
         "compare": _compare,
+        "limit": _limit,
+        "yardstick": _yardstick,
         "design": _design,
+        "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "blind": _blind,
         "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
@@ -215,6 +223,20 @@ def _compare(words: list[str]) -> int:
     return 0
 
 
+def _limit(words: list[str]) -> int:
+    from emir_analysis.limit_command import command
+
+    print(command(words))
+    return 0
+
+
+def _yardstick(words: list[str]) -> int:
+    from emir_analysis.yardstick_command import command
+
+    print(command(words, _progress))
+    return 0
+
+
 def _design(words: list[str]) -> int:
     from emir_analysis.design_command import command
 
@@ -255,6 +277,13 @@ def _bench(words: list[str]) -> int:
     return 0
 
 
+def _linearize(words: list[str]) -> int:
+    from emir_analysis.linearize_command import command
+
+    print(command(words))
+    return 0
+
+
 def _figures(words: list[str]) -> int:
     from emir_analysis.paper_figures import FIGURES, draw
 
@@ -286,6 +315,13 @@ def _diagnose(words: list[str]) -> int:
     o = parser.parse_args(words)
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
+    return 0
+
+
+def _blind(words: list[str]) -> int:
+    from emir_analysis.blind.command import arguments, command
+
+    print(command(arguments(words), _progress))
     return 0
 
 

@@ -2,6 +2,8 @@
 
 import math
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +18,10 @@ from emir_common.version import software_version
 
 CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose between two flushes
 COMPRESSIONS = {"none": CompressionType.NONE, "zstd": CompressionType.ZSTD}
+
+
+class WriteError(RuntimeError):
+    """The recording cannot be written on; what was written is readable. One line."""
 
 
 class _Plain(yaml.SafeDumper):
@@ -179,32 +185,52 @@ class Rosbag2Writer:
         self._file.attach(attachment)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        """Store one message; times in ns."""
-        if self._is_full(log_time):
-            self._split()
-        entry = self._topics[topic]
-        self._file.write(entry, data, log_time, publish_time)
+        """Store one message; times in ns. Raises WriteError, such as for a full disk."""
+        with self._watched():
+            if self._is_full(log_time):
+                self._split()
+            entry = self._topics[topic]
+            self._file.write(entry, data, log_time, publish_time)
         entry.count += 1
         self._span.add(log_time)
 
     def flush(self) -> None:
-        """Hand all that was written to the operating system: it outlives this process."""
-        self._file.writer.flush()  # type: ignore[no-untyped-call]  # mcap's, untyped
+        """Hand all that was written to the operating system: it outlives this process.
+
+        Raises WriteError.
+        """
+        with self._watched():
+            self._file.writer.flush()  # type: ignore[no-untyped-call]  # mcap's, untyped
 
     def close(self) -> None:
         """Finish the files and write metadata.yaml; without a message, leave no folder behind.
 
-        A second call does nothing.
+        A second call does nothing, nor does one after a WriteError. Raises WriteError.
         """
         if self._closed:
             return
         self._closed = True
         text = _yaml(self._description([*self._finished, self._file]))
-        self._file.writer.add_metadata("rosbag2", {"serialized_metadata": text})
-        self._file.finish()
-        (self.folder / "metadata.yaml").write_text(text)
+        with self._watched():
+            self._file.writer.add_metadata("rosbag2", {"serialized_metadata": text})
+            self._file.finish()
+            (self.folder / "metadata.yaml").write_text(text)
         if not self.message_count:
             shutil.rmtree(self.folder)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Give up writing when it fails; the file keeps what is in it."""
+        try:
+            yield
+        except OSError as error:
+            self._closed = True
+            with suppress(OSError):  # it tries once more to write what it still holds
+                self._file.stream.close()
+            raise WriteError(
+                f"{self._file.path}: {error.strerror}: recording ended;"
+                " what came before it is kept (emir bag recover)"
+            ) from None
 
     def _is_full(self, time: int) -> bool:
         span = self._file.span

@@ -2,9 +2,12 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
+
+HALF_OF_PAUSE = 0.5  # after that the next move counts as the one to come
 
 
 class Reference(NamedTuple):
@@ -12,6 +15,17 @@ class Reference(NamedTuple):
 
     stroke: float  # h_d, m
     velocity: float  # dh_d/dt, m/s
+
+
+class Move(NamedTuple):
+    """The move under way, or the next one."""
+
+    since: float  # s since its start, negative before
+    duration: float  # s
+    distance: float  # m
+
+
+NO_MOVE = Move(-math.inf, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -26,11 +40,11 @@ class Trapezoid:
     speed: float
     ramp: float
 
-    @property
+    @cached_property
     def _ramp_time(self) -> float:
         return min(self.ramp, math.sqrt(abs(self.distance) * self.ramp / self.speed))
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Return the time of the whole move, s."""
         if self.distance == 0.0:
@@ -107,7 +121,7 @@ class AwayAndBack:
         p = self.parameters
         return p.delay + 2.0 * (self._move.duration + p.pause)
 
-    @property
+    @cached_property
     def _move(self) -> Trapezoid:
         p = self.parameters
         return Trapezoid(p.distance, p.speed, p.ramp)
@@ -127,6 +141,15 @@ class AwayAndBack:
         """Return the strokes, m, of the `count` periods that follow the next step's own."""
         times = ((state.ticks + k) * dt for k in range(1, count + 1))
         return tuple(self.at(time, state.start).stroke for time in times)
+
+    def move(self, state: TrajectoryState, dt: float) -> Move:
+        """Return the move of the next step's own time; before the way back, that back."""
+        p, duration = self.parameters, self._move.duration
+        since = state.ticks * dt - p.delay
+        back = since - duration - p.pause
+        if back >= -HALF_OF_PAUSE * p.pause:
+            return Move(back, duration, -p.distance)
+        return Move(since, duration, p.distance)
 
     def at(self, time: float, start: float = 0.0) -> Reference:
         """Return the reference `time` s after the beginning at `start`, m."""

@@ -44,6 +44,8 @@ def under_command(plant: Plant, angle: float, command: float) -> Array:
     """
     valve = plant.machine.valve
     opening = max(abs(command) - valve.dead_zone, 0.0) / (1.0 - valve.dead_zone)
+    if opening == 0.0:
+        raise SimulationError(f"y2 = {command:g}: in the valve's dead zone nothing moves")
     guess = math.copysign(opening * valve.flow_nominal, command)
     guess /= plant.machine.cylinder.area_lifting
     found = _solution(plant, angle, lambda velocity: (velocity, command), guess)

@@ -39,7 +39,7 @@ class ForceLoopNode(ControlNode):
         self.state: Any = None
         reject_unknown(self)
         if not self.lockstep:
-            self.create_timer(PLANT_PERIOD_NS * 1e-9, self._watch)
+            self.start_timer(PLANT_PERIOD_NS * 1e-9, self._watch)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return command and terms of this control period."""

@@ -21,6 +21,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals
+from emir_ros.wire import Wire, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -65,7 +66,9 @@ class PlantNode(Shell):
         self._recorded = -1
         profile = qos.requested(self._valves, lockstep=self.lockstep)
         message = conversions.message_class(self._valves.type)
-        self.create_subscription(message, self._valves.name, self._on_command, profile)
+        self._command_wire = Wire(self._valves)
+        name = self._valves.name
+        self.create_subscription(message, name, self._on_command, profile, raw=True)
         if self.lockstep:
             self._start_lockstep()
         else:
@@ -175,8 +178,8 @@ class PlantNode(Shell):
             return self._shut
         return self._command[1]
 
-    def _on_command(self, message: Any) -> None:
-        command = conversions.values(self._valves, message)
+    def _on_command(self, data: bytes) -> None:
+        command = self._command_wire.decode(data)
         bad = {name: value for name, value in command.items() if not math.isfinite(value)}
         if bad:
             told = ", ".join(f"{name} is {value}" for name, value in bad.items())
@@ -184,7 +187,7 @@ class PlantNode(Shell):
             command |= dict.fromkeys(bad, 0.0)
         else:
             self.diagnostics.say(Level.OK, "running")
-        self._command = (conversions.stamp_ns(message), command)
+        self._command = (stamp_ns(data), command)
         self._command_received = time.monotonic()
         if self.lockstep:
             self._advance_when_answered()

@@ -9,14 +9,19 @@ clock otherwise), so a recorder that is killed outright loses no more than that.
 
 import json
 import math
-import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from std_msgs.msg import Header
 
-from emir_analysis.rosbag2_writer import COMPRESSIONS, Rosbag2Writer, channel_metadata
+from emir_analysis.rosbag2_writer import (
+    COMPRESSIONS,
+    Rosbag2Writer,
+    WriteError,
+    channel_metadata,
+)
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.meanings import field_table
@@ -35,13 +40,12 @@ from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
-from emir_ros.shell import Shell
+from emir_ros.shell import NodeError, Shell
+from emir_ros.wire import stamp_ns
 
 PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
-
-CDR_STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
 
 
 class RecorderNode(Shell):
@@ -58,9 +62,12 @@ class RecorderNode(Shell):
         writer = self._make_writer(folder)
         reject_unknown(self)
         self._topics = [_known(name, self._table) for name in names]
+        self._plant_topics = [topic for topic in self._topics if topic.every == "plant"]
+        self._full_names = {name: self.resolve_topic_name(name) for name in names}
         self._writer = writer()
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
+        self._failed = False
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
@@ -69,7 +76,7 @@ class RecorderNode(Shell):
         if not self._described:
             self._record_of_parameters = ParameterRecord(self, nodes, self._describe)
         if not self.lockstep:
-            self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._writer.flush)
+            self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
 
     def _make_writer(self, folder: str) -> Callable[[], Rosbag2Writer]:
         """Declare what the file shall be like."""
@@ -96,24 +103,43 @@ class RecorderNode(Shell):
 
     def close(self) -> None:
         """Write what is left and finish the file."""
+        if self._failed:
+            return
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
-        self._writer.close()
+        with self._watched():
+            self._writer.close()
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Take a recording that cannot go on as the end of this node."""
+        try:
+            yield
+        except WriteError as error:
+            self._failed = True
+            raise NodeError(f"recorder_node: {error}") from None
+
+    def _write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+        with self._watched():
+            self._writer.write(topic, data, log_time, publish_time)
+
+    def _flush(self) -> None:
+        with self._watched():
+            self._writer.flush()
 
     def _record(self, topic: Topic) -> None:
-        full_name = self.resolve_topic_name(topic.name)
+        full_name = self._full_names[topic.name]
         profile = qos.offered(lockstep=self.lockstep)
         about = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
         self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive(data: bytes) -> None:
-            sec, nanosec = CDR_STAMP.unpack_from(data)
-            stamp = sec * conversions.NANOSECONDS + nanosec
+            stamp = stamp_ns(data)
             if self.lockstep:
                 self._on_stamp(topic, stamp, data)
             else:
-                self._writer.write(full_name, data, self.get_clock().now().nanoseconds, stamp)
+                self._write(full_name, data, self.get_clock().now().nanoseconds, stamp)
 
         kind = conversions.message_class(topic.type)
         self.create_subscription(kind, topic.name, receive, profile, raw=True)
@@ -126,22 +152,21 @@ class RecorderNode(Shell):
         while self._described and self._is_complete(self._next):
             self._write_stamp(self._next)
             if self._next % FLUSH_PERIOD_NS == 0:
-                self._writer.flush()
+                self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._report(self._next)
             self._next += PLANT_PERIOD_NS
 
     def _is_complete(self, stamp: int) -> bool:
-        controlled = stamp % CONTROL_PERIOD_NS == 0
-        expected = sum(controlled or topic.every == "plant" for topic in self._topics)
-        return len(self._pending.get(stamp, ())) == expected
+        expected = self._topics if stamp % CONTROL_PERIOD_NS == 0 else self._plant_topics
+        return len(self._pending.get(stamp, ())) == len(expected)
 
     def _write_stamp(self, stamp: int) -> None:
         messages = self._pending.pop(stamp)
         for topic in self._topics:
             if topic.name in messages:
-                full_name = self.resolve_topic_name(topic.name)
-                self._writer.write(full_name, messages[topic.name], stamp, stamp)
+                full_name = self._full_names[topic.name]
+                self._write(full_name, messages[topic.name], stamp, stamp)
 
     def _describe(self, answers: dict[str, dict[str, Any]]) -> None:
         """Store the parameters; in lock step nothing is written before, so as to be the same."""

@@ -6,9 +6,11 @@ runs as fast as it can and the result does not depend on how fast that is.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
@@ -26,9 +28,11 @@ from emir_msgs_py.topics import (
     VELOCITY_COMMAND,
     Topic,
 )
+from emir_plant.plant import SimulationError
 from emir_ros import qos
 from emir_ros.diagnostics import Diagnostics, Level
 from emir_ros.node_parameters import declare
+from emir_ros.wire import Wire, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.time import Time
@@ -55,6 +59,7 @@ class Shell(Node):
         arguments: Sequence[str] | None = None,
         robot: Sequence[Topic] | None = None,
     ) -> None:
+        self.failure: NodeError | ParameterError | SimulationError | None = None
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
@@ -62,13 +67,14 @@ class Shell(Node):
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
-        self._outputs: dict[str, tuple[Topic, Any]] = {}
+        self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
         self._offer(known[self.model])
         self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
         for topic in outputs:
-            self._outputs[topic.name] = (topic, self._publisher(topic.type, topic.name))
+            publisher = self._publisher(topic.type, topic.name)
+            self._outputs[topic.name] = (topic, Wire(topic), publisher)
 
     def _publisher(self, type_name: str, name: str) -> Any:
         kind = conversions.message_class(type_name)
@@ -76,8 +82,49 @@ class Shell(Node):
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
-        publisher = self._outputs[topic.name][1]
-        publisher.publish(conversions.message(topic, stamp, signals))
+        _, wire, publisher = self._outputs[topic.name]
+        publisher.publish(wire.encode(stamp, signals))
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
+    ) -> Any:
+        """Subscribe as rclpy does; a callback that fails ends the node (see `check`)."""
+
+        def call(message: Any) -> None:
+            self._keep_failure(callback, message)
+
+        return super().create_subscription(msg_type, topic, call, *args, **kw)
+
+    def create_timer(
+        self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **kw: Any
+    ) -> Any:
+        """Start a timer as rclpy does; a callback that fails ends the node (see `check`)."""
+
+        def call() -> None:
+            self._keep_failure(callback)
+
+        return super().create_timer(timer_period_sec, call, *args, **kw)
+
+    def _keep_failure(self, callback: Callable[..., None], *args: Any) -> None:
+        """Call back; keep a failure from the executor, which would print a traceback."""
+        try:
+            callback(*args)
+        except (NodeError, ParameterError, SimulationError) as error:
+            self.failure = self.failure or error
+
+    def check(self) -> None:
+        """Raise what a callback failed with, if one did: whoever spins the node calls this."""
+        if self.failure is not None:
+            raise self.failure
+
+    def start_timer(self, period: float, callback: Callable[[], None]) -> None:
+        """Call back every period, s: of /clock if the node uses it, else of a steady clock.
+
+        The computer's time of day may be set while a machine moves; a steady clock does not jump.
+        """
+        simulated = self.get_parameter("use_sim_time").value
+        clock = None if simulated else Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(period, callback, clock=clock)
 
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
@@ -129,7 +176,7 @@ class ControlNode(Shell):
                 self._hear_selector()
         self._offer(outputs)
         if not self.lockstep:
-            self.create_timer(self._period * 1e-9, self._on_timer)
+            self.start_timer(self._period * 1e-9, self._on_timer)
 
     def standing_by(self, control: NodeControl) -> Stepping:
         """Return the controller as this node shall hold it: alone, or one of several."""
@@ -158,29 +205,26 @@ class ControlNode(Shell):
     def take(self, topic: Topic, later: int = 0) -> None:
         """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
         self._inputs[topic.name] = topic
+        wire = Wire(topic)
 
-        def receive(message: Any) -> None:
-            if self.lockstep:
-                self._on_stamp(topic, message, later)
-            else:
-                signals = conversions.values(topic, message)
-                self._latest[topic.name] = (self.get_clock().now(), signals)
+        def receive(data: bytes) -> None:
+            if not self.lockstep:
+                self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
+            elif stamp_ns(data) % self._period == 0:
+                self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
 
         kind = conversions.message_class(topic.type)
         profile = qos.requested(topic, lockstep=self.lockstep)
-        self.create_subscription(kind, topic.name, receive, profile)
+        self.create_subscription(kind, topic.name, receive, profile, raw=True)
 
-    def _on_stamp(self, topic: Topic, message: Any, later: int) -> None:
-        stamp = conversions.stamp_ns(message) + later
-        if stamp % self._period:
-            return
+    def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
         complete = self._pending.setdefault(stamp, {})
         if topic.name in complete or stamp <= self._last_stamp:
             raise NodeError(
                 f"{self.get_name()}: {topic.name} came twice for t = {stamp * 1e-9:.3f} s:"
                 " does more than one node publish it?"
             )
-        complete[topic.name] = conversions.values(topic, message)
+        complete[topic.name] = signals
         if len(complete) == self._expected(stamp):
             del self._pending[stamp]
             self._last_stamp = stamp
@@ -196,7 +240,7 @@ class ControlNode(Shell):
         now = self.get_clock().now()
         missing = self.missing()
         if not missing:
-            fresh = [s for t, s in self._latest.values() if now - t <= self._timeout]
+            fresh = [s for t, s in self._latest.values() if self._is_fresh(t, now)]
             self._run(now.nanoseconds, fresh)
         else:
             self.without(missing)
@@ -208,11 +252,15 @@ class ControlNode(Shell):
         for name in self.needed():
             if name not in self._latest:
                 found.append(f"no {name} yet")
-            elif now - self._latest[name][0] > self._timeout:
+            elif not self._is_fresh(self._latest[name][0], now):
                 found.append(f"no fresh {name}")
             elif self._inputs[name].quality == "command" and self.count_publishers(name) > 1:
                 found.append(f"more than one node publishes {name}")
         return found
+
+    def _is_fresh(self, heard: "Time", now: "Time") -> bool:
+        """Return whether an input is young enough; one from the future met a clock set back."""
+        return 0 <= now.nanoseconds - heard.nanoseconds <= self._timeout.nanoseconds
 
     def without(self, missing: Sequence[str]) -> None:
         """Do what is to be done in a period that cannot run, and say why."""
@@ -240,5 +288,5 @@ class ControlNode(Shell):
         return "running"
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
-        for topic, _ in self._outputs.values():
+        for topic, _, _ in self._outputs.values():
             self.publish(topic, stamp, signals)

@@ -38,7 +38,7 @@ from emir_ros.force_loop_node import ForceLoopNode
 from emir_ros.pfc_node import PfcNode
 from emir_ros.plant_node import PlantNode
 from emir_ros.selector_node import SelectorNode
-from emir_ros.shell import NodeError
+from emir_ros.shell import NodeError, Shell
 from emir_ros.trajectory_node import TrajectoryNode
 
 AT_ONCE = ["--ros-args", "-p", "delay:=0.2"]
@@ -111,6 +111,9 @@ class Graph:
         while not condition():
             assert time.monotonic() < deadline, f"{what}; {self.listener.said}"
             self.executor.spin_once(timeout_sec=0.02)
+            for node in self.nodes:
+                if isinstance(node, Shell):
+                    node.check()
 
     def lose(self, node: Node) -> None:
         """Let a node die."""
@@ -154,6 +157,19 @@ def test_a_killed_controller_shuts_the_valve_within_a_period_and_it_is_said() ->
         assert sum(value != 0.0 for value in after) <= 2
         said = "/force_loop_node: valve shut: no fresh velocity_command"
         graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
+
+
+def test_a_controller_restarted_while_it_moves_takes_the_motion_up_again() -> None:
+    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
+    with _graph(*makes) as graph:
+        graph.until(_moves(graph), "the machine does not move")
+        graph.lose(graph.nodes[3])
+        graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] == 0.0, "the valve stays open")
+        graph.add(CascadeNode())
+        graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] > 0.3, "it does not go on")
+        heard = graph.listener.of(VALVE_COMMAND)
+        first = max(k for k, value in enumerate(heard) if value == 0.0)
+        assert heard[first + 1] < 1.0  # not at full stroke at once
 
 
 def test_a_dead_force_loop_shuts_the_valve_in_the_machine() -> None:

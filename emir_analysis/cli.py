@@ -280,7 +280,7 @@ def _bench(words: list[str]) -> int:
 def _linearize(words: list[str]) -> int:
     from emir_analysis.linearize_command import command
 
-    print(command(words))
+    print(command(words, _progress))
     return 0
 
 

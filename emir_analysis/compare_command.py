@@ -15,6 +15,7 @@ from emir_analysis.outer_loop import OuterLoop
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
+from emir_plant.parameters import cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1
 
@@ -58,6 +59,8 @@ def _table(
     angle, payload = case
     title = f"{angle:g} deg, {payload:g} kg"
     machine = with_values(joint1(), {"geometry.payload": payload})
+    for line in cautions(machine):
+        progress(line)
     runs: dict[str, list[Run]] = {}
     try:
         for name, outer in chosen.items():

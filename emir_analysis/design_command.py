@@ -16,9 +16,10 @@ from emir_analysis.design_pfc import (
     stability_map,
 )
 from emir_analysis.errors import InputError
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
-from emir_plant.parameters import Machine
+from emir_plant.parameters import Machine, cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
@@ -36,6 +37,8 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
         tuning=_tuning(options),
     )
     machine = _machine(options.machine)
+    for line in cautions(with_values(machine, {"geometry.payload": options.payload})):
+        progress(line)
     progress("linearizing and reducing")
     try:
         parameters = design_pfc(machine, task)

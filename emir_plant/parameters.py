@@ -12,7 +12,7 @@ from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
 
 GRAVITY = 9.81  # m/s^2
-LARGEST_PAYLOAD = 1500.0  # kg, paper 1
+RATED_PAYLOAD = 1500.0  # kg, paper 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +130,14 @@ class Machine:
             check_ranges(group, path + ".")
 
 
+def cautions(machine: Machine) -> list[str]:
+    """Return a line for each value that is allowed but beyond what the machine is made for."""
+    load = machine.geometry.payload + machine.effects.payload.mass
+    if load <= RATED_PAYLOAD:
+        return []
+    return [f"warning: payload = {load:g} kg: the machine is made for {RATED_PAYLOAD:g} kg"]
+
+
 def groups(machine: Machine) -> dict[str, Any]:
     """Return the parameter groups by dotted path, each effect being a group."""
     found = {f.name: getattr(machine, f.name) for f in dataclasses.fields(machine)}
@@ -137,11 +145,3 @@ def groups(machine: Machine) -> dict[str, Any]:
     for effect in dataclasses.fields(effects):
         found[f"effects.{effect.name}"] = getattr(effects, effect.name)
     return found
-
-
-def overload(machine: Machine) -> str | None:
-    """Return one line about a payload beyond what the machine is made for; None within."""
-    payload = machine.geometry.payload + machine.effects.payload.mass
-    if payload <= LARGEST_PAYLOAD:
-        return None
-    return f"geometry.payload: {payload:g} kg in all, more than the {LARGEST_PAYLOAD:g} kg of EMIR"

@@ -20,7 +20,7 @@ from emir_msgs_py.topics import (
     VALVE_COMMAND,
     Topic,
 )
-from emir_plant.parameters import overload
+from emir_plant.parameters import cautions
 from emir_plant.plant import Plant
 from emir_plant.robot import require_pinocchio
 from emir_plant.sensors import measure
@@ -73,7 +73,8 @@ class Joint1Machine:
         sheet = declare(node, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
         base = load_sheet(Path(sheet)).machine if sheet else joint1()
         self.plant = Plant(declare_tree(node, base))
-        warn_of_overload(node, overload(self.plant.machine))
+        for line in cautions(self.plant.machine):
+            node.get_logger().warning(line)
         self.state = self.plant.initial(start.initial_angle, pressure_lowering)
         self.truth = self.plant.outputs(self.state)
 
@@ -104,7 +105,8 @@ class RobotMachine:
         self._by_signals = robot_machine
         start = declare_tree(node, Start()).initial_angles
         self.plant = RobotPlant(declare_tree(node, declare_robot(node), without="main."))
-        warn_of_overload(node, overload(self.plant.robot.main))
+        for line in cautions(self.plant.robot.main):
+            node.get_logger().warning(line)
         self.state = self.plant.initial(start.angles, pressure_lowering)
         self.truth = self.plant.outputs(self.state)
 
@@ -123,9 +125,3 @@ class Start:
     """Where the robot stands."""
 
     initial_angles: Posture = Posture()
-
-
-def warn_of_overload(node: Node, said: str | None) -> None:
-    """Log what there is to say about the payload, if there is."""
-    if said:
-        node.get_logger().warning(said)

@@ -144,4 +144,4 @@ def test_payload_beyond_the_machine_is_warned_of(
     words = ["--model", model, "--params", str(file), "--duration", "0.1"]
     assert run_graph([*words, "--bag", str(tmp_path / "run")]) == 0
     error = capfd.readouterr().err
-    assert error.count("1600 kg in all, more than the 1500 kg of EMIR") == 1
+    assert error.count("payload = 1600 kg: the machine is made for 1500 kg") == 1

@@ -1,7 +1,6 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -50,10 +49,10 @@ def declare_pfc(node: Node, output: str) -> PfcParameters:
 
     Raises ParameterError, naming node and parameter or file.
     """
-    about = "YAML made by emir design; empty: the one that comes with the project"
+    about = "YAML made by emir design; empty or `scheduled`: those that come with the project"
     file = declare(node, "model_file", "", about)
     try:
-        design = pfc_file.load(Path(file) if file else pfc_file.default_file(output), output)
+        design = pfc_file.load(pfc_file.find(file, output), output)
         design = replace(
             design,
             form=declare(node, "form", design.form, ", ".join(get_args(Form))),

@@ -1,6 +1,7 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor

@@ -3,8 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from emir_analysis.diagnosis.balances import BALANCES
-from emir_analysis.diagnosis.candidates import LINKAGE
+from emir_analysis.diagnosis.balances import BALANCES, LINKAGE
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
 from emir_analysis.diagnosis.free_run import free_run

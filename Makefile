@@ -7,14 +7,14 @@ OUT := out/demo
 # A sourced ROS 2 Jazzy is used; without one, its wheels are installed from the package index.
 ifeq ($(and $(filter jazzy,$(ROS_DISTRO)),$(AMENT_PREFIX_PATH)),)
   ROS := wheels
-  EXTRAS := robot,ros,test,lint
+  EXTRAS := robot,ros,design,view,test,lint
   CANDIDATES := python3.12 python3.11 python3
   export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)
   # Nothing of another environment: these would bring in its libraries or another middleware.
   unexport LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 else
   ROS := system
-  EXTRAS := robot,test,lint
+  EXTRAS := robot,design,view,test,lint
   CANDIDATES := python3 python3.12 python3.11
   export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 endif

@@ -23,7 +23,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=["emir_*"]),
-    package_data={"": ["py.typed", "data/*.yaml"]},
+    package_data={"": ["py.typed", "data/*.yaml", "bench/*.c"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -34,10 +34,11 @@ setup(
     entry_points={"console_scripts": ["emir = emir_analysis.cli:main"]},
     install_requires=[
         "matplotlib>=3.8",
-        "mcap>=1.1",
+        "mcap>=1.5",
         "mcap-ros2-support>=0.5",
         "numba>=0.59",
         "numpy>=1.26",
+        "plotly>=6.0",
         "pyyaml>=6.0.1",
         "scipy>=1.12",
     ],
@@ -46,9 +47,18 @@ setup(
         "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
         # The whole robot's mechanics; the main joint does without.
         "robot": ["pin>=4.1"],
+        # The blind test on the machines of a Dask cluster.
+        "cluster": ["distributed>=2024.8"],
+        # Linear models as python-control systems: emir linearize.
+        "design": ["control>=0.10"],
+        # `emir view`: the page in the browser.
+        "view": ["viser>=1.1"],
         "test": [
             "control>=0.10",
+            "distributed>=2024.8",
             "mujoco>=3.2",
+            "pandas>=2.2",
+            "playwright>=1.40",
             "pytest>=8.2",
             "pytest-timeout>=2.3",
             "rosbags>=0.10",

@@ -1,5 +1,6 @@
 """Reading rosbag2 recordings in MCAP: messages with their times, and what was stored beside."""
 
+import os
 import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -75,10 +76,16 @@ def files(path: Path) -> list[Path]:
     """Return the .mcap files of a recording. Raises InputError when there are none."""
     if not path.exists():
         raise InputError(f"{path}: no such recording")
-    found = [path] if path.is_file() else sorted(path.glob("*.mcap"))
+    found = [path] if path.is_file() else sorted(path.glob("*.mcap"), key=_place)
     if not found or found[0].suffix != ".mcap":
         raise InputError(f"{path}: not a recording: no .mcap file")
     return found
+
+
+def _place(file: Path) -> tuple[int, str]:
+    """Order the files of a split recording: NAME_2.mcap comes before NAME_10.mcap."""
+    number = file.stem.rpartition("_")[2]
+    return (int(number) if number.isdecimal() else 0, file.name)
 
 
 def recorded_topics(path: Path) -> set[str]:
@@ -113,7 +120,9 @@ def is_finished(file: Path) -> bool:
     Raises InputError for a file that cannot be read.
     """
     try:
-        return file.read_bytes().endswith(MAGIC)
+        with file.open("rb") as stream:
+            stream.seek(-min(len(MAGIC), file.stat().st_size), os.SEEK_END)
+            return stream.read() == MAGIC
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
 

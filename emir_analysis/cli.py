@@ -13,14 +13,21 @@ from emir_common.quantity import ParameterError
 USAGE = """usage: emir COMMAND ...
 
   run        run the graph of machine and controllers, record it, show its figures
+  import     a CSV file as a recording, by a signal map
   info       what is in a recording, and whether it was finished
   bag        recover a recording that was cut off
   replay     a recording's inputs to its controller: does it give what was recorded?
-  analyze    figures and pictures of a recording of the graph
+  view       a recording or the running graph as a page in the browser: arm, pressures, valve
+  analyze    figures and plots of recordings of the graph, one or several side by side
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
+  limit      the smallest deflection of the TCP that any command could reach for a move
+  yardstick  controllers against that limit, over random draws of the machine
   design     a predictive controller for a machine, and where it is stable
+  linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  blind      machines with something hidden in them: does the diagnosis find it?
+  bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
 
@@ -30,14 +37,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
+        "import": _import,
         "info": _info,
         "bag": _bag,
         "replay": _replay,
+        "view": _view,
         "analyze": _analyze,
         "compare": _compare,
+        "limit": _limit,
+        "yardstick": _yardstick,
         "design": _design,
+        "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "blind": _blind,
+        "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
         print(USAGE)
@@ -61,21 +75,59 @@ def _complain(who: str, message: str) -> int:
 
 
 def _run(words: list[str]) -> int:
+    """Run the graph."""
+    return _hand_over("emir_ros.run", words)
+
+
+def _hand_over(module: str, words: list[str]) -> int:
     """Hand over to the one package that knows ROS, in this same process.
 
     -P: what lies in the current folder is not imported.
     """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.run", *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", module, *words])  # noqa: S606
+
+
+def _import(words: list[str]) -> int:
+    from emir_analysis.import_command import import_csv
+
+    parser = argparse.ArgumentParser(prog="emir import")
+    parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
+    parser.add_argument(
+        "--signals", type=Path, required=True, help="YAML: signal, column, topic, field, unit"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="BAG", help="must not exist")
+    parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
+    o = parser.parse_args(words)
+    try:
+        rows = (
+            None if o.rows is None else slice(*(int(n) if n else None for n in o.rows.split(":")))
+        )
+    except (TypeError, ValueError):
+        raise InputError(f"--rows {o.rows}: not of the form A:B") from None
+    made = import_csv(o.table, o.signals, o.out, rows)
+    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}")
+    return 0
 
 
 def _info(words: list[str]) -> int:
-    from emir_analysis.info import info, text
+    from emir_analysis.info import fields_text, info, parameters_text, text
 
     parser = argparse.ArgumentParser(prog="emir info")
     parser.add_argument("bag", type=Path, help="any recording in MCAP")
-    print(text(info(parser.parse_args(words).bag)))
+    parser.add_argument("--fields", action="store_true", help="unit and meaning of every field")
+    parser.add_argument(
+        "--parameters", action="store_true", help="the nodes' parameters, as a ROS parameter file"
+    )
+    options = parser.parse_args(words)
+    found = info(options.bag)
+    if options.fields:
+        print(fields_text(found))
+    if options.parameters:
+        print(parameters_text(found))
+    if not (options.fields or options.parameters):
+        print(text(found))
     return 0
 
 
@@ -99,7 +151,8 @@ def _bag(words: list[str]) -> int:
 def _replay(words: list[str]) -> int:
     import yaml
 
-    from emir_analysis.replay import NODES, replay, same, text
+    from emir_analysis.replay import NODES, replay, text
+    from emir_analysis.stamped import same
 
     parser = argparse.ArgumentParser(prog="emir replay")
     parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
@@ -123,20 +176,30 @@ def _replay(words: list[str]) -> int:
     return 0 if changed or same(fields) else 1
 
 
+def _view(words: list[str]) -> int:
+    from emir_analysis.view.command import command
+
+    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
+
+
 def _analyze(words: list[str]) -> int:
-    from emir_analysis.run_report import analyze, text, write_json, write_report
+    from emir_analysis import run_report
 
     parser = argparse.ArgumentParser(prog="emir analyze")
-    parser.add_argument("bag", type=Path, help="a recording of the graph")
+    parser.add_argument("bag", type=Path, nargs="+", help="recordings of the graph")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
-    run = analyze(options.bag)
-    print(text(run))
-    if options.json:
-        write_json(run, options.json)
-    if options.html:
-        write_report(run, options.html)
+    runs = [run_report.analyze(bag) for bag in options.bag]
+    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
+    for file, write in (
+        (options.json, run_report.write_json),
+        (options.csv, run_report.write_csv),
+        (options.html, run_report.write_report),
+    ):
+        if file:
+            write(runs, file)
     return 0
 
 
@@ -156,6 +219,20 @@ def _compare(words: list[str]) -> int:
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _limit(words: list[str]) -> int:
+    from emir_analysis.limit_command import command
+
+    print(command(words))
+    return 0
+
+
+def _yardstick(words: list[str]) -> int:
+    from emir_analysis.yardstick_command import command
+
+    print(command(words, _progress))
     return 0
 
 
@@ -180,6 +257,29 @@ def _design(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     print(command(parser.parse_args(words), _progress))
+    return 0
+
+
+def _bench(words: list[str]) -> int:
+    if words[:1] == ["graph"]:
+        return _hand_over("emir_ros.bench", words[1:])
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
+    from emir_analysis.bench.command import PARTS, command
+
+    parser = argparse.ArgumentParser(prog="emir bench")
+    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    command(parser.parse_args(words), print)
+    return 0
+
+
+def _linearize(words: list[str]) -> int:
+    from emir_analysis.linearize_command import command
+
+    print(command(words))
     return 0
 
 
@@ -214,6 +314,13 @@ def _diagnose(words: list[str]) -> int:
     o = parser.parse_args(words)
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
+    return 0
+
+
+def _blind(words: list[str]) -> int:
+    from emir_analysis.blind.command import arguments, command
+
+    print(command(arguments(words), _progress))
     return 0
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.node_controls import force_loop_signals
 from emir_analysis.outer_loop import CascadeLoop, OuterLoop, Situation
-from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
+from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters, ForceLoopState
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
@@ -18,7 +19,7 @@ from emir_msgs_py.topics import (
     TRUTH,
 )
 from emir_plant.plant import Plant
-from emir_plant.sensors import measure
+from emir_plant.sensors import Measurement, measure
 
 Array = NDArray[np.float64]
 
@@ -54,35 +55,37 @@ class ClosedLoop:
                 here = TrajectoryInputs(reading.stroke)
                 following = following or self.trajectory.initial(here)
                 preview = self.trajectory.ahead(following, len(CYLINDER_PREVIEW.fields), PERIOD)
+                move = self.trajectory.move(following, PERIOD)
                 following, reference = self.trajectory.step(following, here, PERIOD)
 
-                now = Situation(reference, preview, reading)
+                now = Situation(reference, preview, reading, move)
                 controlling, wanted = self.outer.step(controlling, now, PERIOD)
-
-                sensed = ForceLoopInputs(
-                    wanted["velocity_command"],
-                    0.0,
-                    reading.angle,
-                    reading.pressure_lifting,
-                    reading.pressure_lowering,
-                )
-                damping = damping or self.force_loop.initial(sensed)
-                damping, valve = self.force_loop.step(damping, sensed, PERIOD)
 
                 signals = {
                     "reference_stroke": reference.stroke,
                     "reference_velocity": reference.velocity,
-                    "valve_command": valve.valve_command,
-                    "measured_force": valve.force,
-                    "force_feedback": valve.feedback,
-                    "wanted_velocity": valve.velocity,
-                    "saturated": float(valve.saturated),
                 }
+                if "velocity_command" in wanted:
+                    damping, valve = self._force_loop(damping, wanted["velocity_command"], reading)
+                    signals |= valve
+                signals |= wanted
                 ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
-                _append(rows, wanted | signals | ahead)
+                _append(rows, signals | ahead)
             if tick < last:
                 state, truth = self.plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}
+
+    def _force_loop(
+        self, state: ForceLoopState | None, command: float, reading: Measurement
+    ) -> tuple[ForceLoopState, dict[str, float]]:
+        """Return the force loop's next state and signals under a velocity command, m/s."""
+        inputs = ForceLoopInputs(
+            command, 0.0, reading.angle, reading.pressure_lifting, reading.pressure_lowering
+        )
+        state, outputs = self.force_loop.step(
+            state or self.force_loop.initial(inputs), inputs, PERIOD
+        )
+        return state, force_loop_signals(outputs)
 
 
 def _append(rows: dict[str, list[float]], signals: dict[str, float]) -> None:

@@ -25,9 +25,9 @@ def command(options: Namespace, progress: Progress) -> str:
     """Run, draw, return the tables. Raises InputError or ParameterError."""
     if options.damping:
         if options.picture:
-            _save(damping.picture(joint1()), options.picture)
+            save(damping.picture(joint1()), options.picture)
         return damping.as_text(joint1())
-    chosen = _chosen(controllers(options.pfc, options.pfc_tip), options.controllers)
+    chosen = select(controllers(options.pfc, options.pfc_tip), options.controllers)
     trajectory = named(options.trajectory, TrajectoryParameters())
     if trajectory.parameters.distance == 0.0:
         raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
@@ -39,7 +39,8 @@ def command(options: Namespace, progress: Progress) -> str:
     return "\n\n".join(_table(chosen, trajectory, case, options, progress) for case in cases)
 
 
-def _chosen(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
+def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
+    """Return the controllers of these names, or all; raises ParameterError for an unknown one."""
     for name in names or ():
         if name not in known:
             raise ParameterError(f"controller {name!r}: there are {'; '.join(known)}")
@@ -66,11 +67,12 @@ def _table(
     except SimulationError as error:
         return f"{title}: {error}"
     if options.picture:
-        _save(picture({name: found[0] for name, found in runs.items()}), options.picture)
+        save(picture({name: found[0] for name, found in runs.items()}), options.picture)
     return f"{title}\n\n{as_text(runs)}"
 
 
-def _save(figure: Figure, file: Path) -> None:
+def save(figure: Figure, file: Path) -> None:
+    """Write a picture; raises InputError, naming the file."""
     try:
         figure.savefig(file, dpi=120)
     except (OSError, ValueError) as error:

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.optimize import root
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, check_ranges, quantity
@@ -19,7 +18,7 @@ from emir_control.pfc import Pfc, PfcParameters
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.prefilter import valve_command
 from emir_msgs_py.topics import CONTROL_PERIOD_NS
-from emir_plant import core, linkage
+from emir_plant import core, operating_point
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
@@ -27,7 +26,6 @@ from emir_plant.plant import Plant, SimulationError
 Array = NDArray[np.float64]
 
 PERIOD = CONTROL_PERIOD_NS * 1e-9
-BAR = 1e5
 DAMPED = ForceLoopParameters()
 OUTPUTS = {"pfc": STROKE, "pfc_tip": TIP_ANGLE}  # by controller
 ORDERS = {STROKE: 6, TIP_ANGLE: 8}  # paper 3.3
@@ -71,27 +69,7 @@ def steady_motion(plant: Plant, point: OperatingPoint) -> tuple[Array, float]:
 
     Raises SimulationError where the machine has no such motion.
     """
-    p = plant.record[0]
-    rate = point.velocity / linkage.lever_arm(point.angle, p) / p["mode_joint"][0]
-
-    def state(pressure: float, opening: float) -> Array:
-        x = plant.initial(point.angle, pressure * BAR)
-        x[core.SPOOL], x[core.LOGIC] = opening, 1.0
-        x[core.MODES + p["mode_joint"].size] = rate  # the boom turns as a whole
-        return x
-
-    def pressure_rates(unknown: Array) -> Array:
-        pressure, opening = unknown
-        return plant.derivative(state(pressure, opening), opening)[[core.P_H, core.P_S]] / BAR
-
-    guess = valve_command(point.velocity, DAMPED.prefilter)
-    found = root(pressure_rates, [30.0, guess])
-    if not found.success or abs(found.x[1]) > 1.0:
-        raise SimulationError(
-            f"no steady motion of {point.velocity * 1e3:g} mm/s at"
-            f" {math.degrees(point.angle):.0f} deg with {point.payload:g} kg"
-        )
-    return state(*found.x), float(found.x[1])
+    return operating_point.at_velocity(plant, point.angle, point.velocity)
 
 
 def velocity_model(

@@ -1,13 +1,18 @@
 """What a recording says of itself, and what is in it."""
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import yaml
 from mcap.records import Channel, Message, Metadata, Schema
 
 from emir_analysis import bags
 
 DESCRIPTION = "emir"  # the metadata record in which the graph describes its run
+PARAMETERS = "emir.parameters"  # the one with the parameters of its nodes, JSON by node
+FIELDS = "fields"  # the channel metadata with path, unit and meaning by signal, JSON
 
 
 @dataclass
@@ -15,6 +20,7 @@ class TopicInfo:
     """A recorded topic. first, last: log times, ns."""
 
     type: str
+    fields: dict[str, dict[str, str]] = field(default_factory=dict)
     count: int = 0
     first: int = 0
     last: int = 0
@@ -34,12 +40,16 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class Info:
-    """about: the run's own description. unfinished: the files that were cut off."""
+    """about: the run's own description. unfinished: the files that were cut off.
+
+    parameters: value by name, by node.
+    """
 
     bag: Path
     about: dict[str, str]
     topics: dict[str, TopicInfo]
     unfinished: list[Path] = field(default_factory=list)
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
@@ -68,11 +78,15 @@ def _count(file: Path, found: Info) -> None:
             types[record.id] = record.name
         elif isinstance(record, Channel):
             kind = types.get(record.schema_id, "unknown type")
-            topics[record.id] = found.topics.setdefault(record.topic, TopicInfo(kind))
+            new = TopicInfo(kind, json.loads(record.metadata.get(FIELDS, "{}")))
+            topics[record.id] = found.topics.setdefault(record.topic, new)
         elif isinstance(record, Message) and record.channel_id in topics:
             topics[record.channel_id].add(record.log_time)
         elif isinstance(record, Metadata) and record.name == DESCRIPTION:
             found.about.update(record.metadata)
+        elif isinstance(record, Metadata) and record.name == PARAMETERS:
+            values = {node: json.loads(text) for node, text in record.metadata.items()}
+            found.parameters.update(values)
 
 
 def text(found: Info) -> str:
@@ -87,6 +101,24 @@ def text(found: Info) -> str:
         rate = "-" if topic.rate is None else f"{topic.rate:.2f}"
         lines.append(f"  {name:{wide}}  {topic.type:{kinds}}  {topic.count:>8} {rate:>9} Hz")
     return "\n".join([f"{found.bag}:", *lines])
+
+
+def fields_text(found: Info) -> str:
+    """Return a line per recorded signal: topic and field, unit, meaning."""
+    lines = [
+        f"{name} {entry['path']} [{entry['unit']}]  {signal}: {entry['meaning']}"
+        for name, topic in sorted(found.topics.items())
+        for signal, entry in topic.fields.items()
+    ]
+    return "\n".join(lines) or f"{found.bag}: does not say what its fields mean"
+
+
+def parameters_text(found: Info) -> str:
+    """Return the parameters of the nodes as a ROS 2 parameter file."""
+    if not found.parameters:
+        return f"# {found.bag}: holds no parameters"
+    tree = {node: {"ros__parameters": values} for node, values in found.parameters.items()}
+    return yaml.safe_dump(tree, sort_keys=False).rstrip()
 
 
 def _state(found: Info) -> str:

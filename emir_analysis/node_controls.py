@@ -4,7 +4,7 @@ The nodes of the graph and the replay of a recording both hold these objects.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from emir_analysis.outer_loop import pfc_signals
 from emir_control.cascade import Cascade, CascadeInputs
@@ -33,14 +33,32 @@ Signals = dict[str, float]
 Topics = tuple[Topic, ...]
 
 
-class NodeControl(Protocol):
-    """From the signals of the inputs to those of the outputs."""
+class Stepping(Protocol):
+    """From the signals of a period to others."""
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the outputs of one period of dt, s; None: begin here."""
+
+
+class NodeControl(Stepping, Protocol):
+    """What a node computes, from the signals of its inputs to those of its outputs."""
 
     inputs: ClassVar[Topics]
     outputs: ClassVar[Topics]
 
-    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
-        """Return the next state and the outputs of one period of dt, s; None: begin here."""
+
+@runtime_checkable
+class Switchable(NodeControl, Protocol):
+    """A controller that can hold its state ready while another one moves the machine.
+
+    state None: begin here. command: in force, m/s.
+    """
+
+    def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the next state when that command was applied in this period."""
+
+    def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the state whose next command is the one in force."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +89,22 @@ class CascadeControl:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
-        inputs = CascadeInputs(_reference(signals), signals["stroke"])
+        inputs = self._inputs(signals)
         state, outputs = self.cascade.step(state or self.cascade.initial(inputs), inputs, dt)
         return state, outputs._asdict()
+
+    def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the next state when that command was applied in this period."""
+        inputs = self._inputs(signals)
+        return self.cascade.follow(state or self.cascade.initial(inputs), inputs, command, dt)
+
+    def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the state whose next command is the one in force."""
+        inputs = self._inputs(signals)
+        return self.cascade.take_over(state or self.cascade.initial(inputs), inputs, command, dt)
+
+    def _inputs(self, signals: Signals) -> CascadeInputs:
+        return CascadeInputs(_reference(signals), signals["stroke"])
 
 
 @dataclass(frozen=True)
@@ -86,11 +117,23 @@ class PfcControl:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
-        wanted = _reference(signals)
-        stroke = signals["stroke"]
-        inputs = PfcInputs(wanted.stroke, wanted.velocity, _preview(signals), stroke)
+        inputs = self._inputs(signals)
         state, outputs = self.pfc.step(state or self.pfc.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc", outputs)
+
+    def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the next state when that command was applied in this period."""
+        inputs = self._inputs(signals)
+        return self.pfc.follow(state or self.pfc.initial(inputs), inputs, command)
+
+    def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the state whose next command is the one in force."""
+        inputs = self._inputs(signals)
+        return self.pfc.take_over(state or self.pfc.initial(inputs, command), inputs)
+
+    def _inputs(self, signals: Signals) -> PfcInputs:
+        wanted = _reference(signals)
+        return PfcInputs(wanted.stroke, wanted.velocity, _preview(signals), signals["stroke"])
 
 
 @dataclass(frozen=True)
@@ -105,10 +148,23 @@ class PfcTipControl:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
-        measured = signals["angle"], signals["deflection"]
-        inputs = TipInputs(_reference(signals), _preview(signals), *measured)
+        inputs = self._inputs(signals)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc_tip", outputs)
+
+    def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the next state when that command was applied in this period."""
+        inputs = self._inputs(signals)
+        return self.tip.follow(state or self.tip.initial(inputs), inputs, command)
+
+    def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
+        """Return the state whose next command is the one in force."""
+        inputs = self._inputs(signals)
+        return self.tip.take_over(state or self.tip.initial(inputs, command), inputs)
+
+    def _inputs(self, signals: Signals) -> TipInputs:
+        measured = signals["angle"], signals["deflection"]
+        return TipInputs(_reference(signals), _preview(signals), *measured)
 
 
 @dataclass(frozen=True)

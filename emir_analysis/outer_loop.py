@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
+from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.tip import Tip, TipInputs
-from emir_control.trajectory import Reference
+from emir_control.trajectory import NO_MOVE, Move, Reference
 from emir_plant.sensors import Measurement
 
 Signals = dict[str, float]
@@ -18,6 +19,7 @@ class Situation(NamedTuple):
     reference: Reference
     preview: tuple[float, ...]  # reference strokes of the next periods, m
     reading: Measurement
+    move: Move = NO_MOVE
 
 
 class OuterLoop(Protocol):
@@ -65,6 +67,34 @@ class PfcTipLoop:
         inputs = TipInputs(now.reference, now.preview, now.reading.angle, now.reading.deflection)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc_tip", outputs)
+
+
+@dataclass(frozen=True)
+class LqgLoop:
+    """LQG about a planned motion; gives the valve command itself."""
+
+    lqg: Lqg
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        r = now.reading
+        inputs = LqgInputs(
+            now.reference.stroke,
+            now.move,
+            r.angle,
+            r.pressure_lifting,
+            r.pressure_lowering,
+            r.deflection,
+        )
+        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
+        return state, lqg_signals(outputs)
+
+
+def lqg_signals(outputs: LqgOutputs) -> Signals:
+    """Return command and terms by the names of the topic table."""
+    terms = outputs._asdict()
+    command = terms.pop("valve_command")
+    return {"valve_command": command} | {f"lqg_{name}": value for name, value in terms.items()}
 
 
 def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:

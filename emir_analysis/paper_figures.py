@@ -11,7 +11,7 @@ from emir_analysis.errors import InputError
 from emir_analysis.figure_steps import StepResponses
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import Machine
-from emir_plant.sheet import joint1
+from emir_plant.sheet import even_edges, joint1
 
 FIGURES = {
     3: "stationary and dynamic deflection of the stretched boom",
@@ -38,7 +38,7 @@ def draw(only: Sequence[int], folder: Path, progress: Callable[[str], None]) -> 
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: {error.strerror}") from None
-    steps = figure_steps.step_responses(machine)
+    steps = figure_steps.step_responses(even_edges())
     for number in only:
         progress(f"figure {number}: {FIGURES[number]}")
         files.append(folder / f"figure_{number:02}.png")

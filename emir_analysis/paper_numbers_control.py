@@ -18,9 +18,10 @@ from emir_control.internal_model import InternalModel
 from emir_control.pfc import PREVIEW
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
-from emir_plant import linkage
+from emir_plant import core, linkage
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
+from emir_plant.sheet import even_edges
 
 Array = NDArray[np.float64]
 
@@ -58,16 +59,33 @@ def _conventional(machine: Machine, signals: Run, moves: list[MoveFigures]) -> I
         judged(is_about(float(np.mean(lags)), LAG, 0.1)),
     )  # fmt: skip
     up, down = max(m.up for m in moves), min(m.down for m in moves)
-    error = _tcp_error(machine, signals)
+    most, least = _full_step_bending(even_edges())
     met = is_about(up, 0.17, 0.01) and is_about(down, -0.17, 0.01)
     yield Number(
-        14, "conventional control: TCP", "+-17 cm about the static 18 cm",
+        14, "conventional control: TCP, read as bending", "+-17 cm about the static 18 cm",
         f"{up * 1e2:+.1f} / {down * 1e2:+.1f} cm", "bending while it moves, less the sag",
         judged(met), "" if met else
-        "bending alone is small with a damped loop; the whole error of the TCP against the"
-        f" reference {LAG:g} s ago is {error.max() * 1e2:+.1f} / {error.min() * 1e2:+.1f} cm,"
-        " the likelier reading",
+        "bending alone stays small in a damped loop; with even edges, undamped, the valve's full"
+        f" step bends by {most * 1e2:+.1f} / {least * 1e2:+.1f} cm",
     )  # fmt: skip
+    error = _tcp_error(machine, signals)
+    half = 0.5 * float(np.ptp(error))
+    yield Number(
+        14, "conventional control: TCP, read as its whole error", "+-17 cm about the static 18 cm",
+        f"{error.max() * 1e2:+.1f} / {error.min() * 1e2:+.1f} cm, +-{half * 1e2:.1f} cm",
+        f"oil and boom together, against the reference {LAG:g} s ago; about: within a tenth",
+        judged(abs(half - 0.17) < 0.017), "the likelier reading",  # noqa: PLR2004 (the paper's)
+    )  # fmt: skip
+
+
+def _full_step_bending(machine: Machine) -> tuple[float, float]:
+    """Return the largest and least bending, m, less the sag, over the valve's full steps."""
+    plant, period = Plant(machine), 5e-3
+    start = plant.initial(FORTY_FIVE)
+    column = core.Truth._fields.index("tcp_deflection")
+    runs = [plant.simulate(start, np.full(600, y), period)[:, column] for y in (1.0, -1.0)]
+    bent = np.concatenate(runs) - runs[0][0]
+    return float(bent.max()), float(bent.min())
 
 
 def _tcp_error(machine: Machine, signals: Run) -> Array:

@@ -1,6 +1,7 @@
 """The paper's numbers beside ours, all of them measured when the table is made."""
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -38,7 +39,9 @@ class Table:
             "# Step responses of the valve",
             "",
             "Fitted to the tip's angular velocity: a decaying oscillation on a parabola of time.",
-            "rest: what that does not explain; closings: of the logic block; p_H: least, in bar.",
+            "linear: damping linearized in steady motion through the same posture; rest: what the",
+            "fit does not explain; closings: of the logic block; least flow: of Q_H, over its",
+            "mean; p_H: its least. The valve with even edges is data/joint1_even_edges.yaml.",
             "",
             figure_steps.as_text(self.steps),
         ]
@@ -50,13 +53,15 @@ class Table:
             {
                 "machine": machine,
                 "angle": r.angle,
-                "direction": direction,
+                "direction": figure_steps.NAMES[r.direction],
                 "y2": r.direction * r.size,
                 "logic_block_closes": r.interruptions,
                 "least_pressure_lifting": r.lowest,
+                "least_flow_lifting_over_mean": r.least_flow,
+                "linear_damping": None if math.isnan(r.linear) else r.linear,
             }
             | asdict(r.mode)
-            for machine, direction, r in figure_steps.rows(self.steps)
+            for machine, r in figure_steps.rows(self.steps)
         ]
         return {"numbers": [asdict(n) for n in self.numbers], "step_responses": steps}
 

@@ -1,16 +1,13 @@
-"""A recording's inputs fed to its controller, the answers compared with the recorded ones.
+"""A recording's inputs fed to one of its nodes, the answers compared with the recorded ones.
 
 Open loop: what was recorded is fed whatever the controller answers.
 """
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
@@ -20,9 +17,13 @@ from emir_analysis.node_controls import (
     NodeControl,
     PfcControl,
     PfcTipControl,
+    Stepping,
     TrajectoryControl,
 )
+from emir_analysis.replay_plant import replay_plant
 from emir_analysis.run_signals import full_name
+from emir_analysis.stamped import FieldComparison, by_stamp, compared
+from emir_analysis.switching import Ready
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -31,39 +32,18 @@ from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.pfc import Pfc, PfcParameters
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    OFFERED_COMMANDS,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+)
 
-Array = NDArray[np.float64]
 Values = dict[str, Any]
 
-NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop")
-OF_EVERY_NODE = ("lockstep", "input_timeout")  # parameters of the node, not of its controller
-
-
-@dataclass(frozen=True)
-class FieldComparison:
-    """A signal as recorded and as replayed, (n,) each, one value a control period.
-
-    n = 0: an older recording that does not have the topic.
-    """
-
-    topic: str
-    name: str
-    unit: str
-    recorded: Array
-    replayed: Array
-
-    @property
-    def equal(self) -> int:
-        """Return how many samples agree in every bit."""
-        return int(np.sum(self.recorded.view(np.int64) == self.replayed.view(np.int64)))
-
-    @property
-    def largest_difference(self) -> float:
-        """Return the largest difference; nan where one of the two is not a number."""
-        differ = self.recorded.view(np.int64) != self.replayed.view(np.int64)
-        return float(np.max(np.abs(self.replayed - self.recorded)[differ], initial=0.0))
+PLANT = "plant"
+NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
+OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -75,30 +55,29 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
+    if node == PLANT:
+        return replay_plant(bag, changed)
     about = bags.metadata(bag).get("emir", {})
     control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
-    inputs = _by_stamp(bag, control.inputs)
-    there = bags.recorded_topics(bag)
-    kept = tuple(topic for topic in control.outputs if full_name(topic, there))
-    outputs = _by_stamp(bag, kept or control.outputs)
+    law: Stepping = control
+    inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
+    there, answers = bags.recorded_topics(bag), control.outputs
+    offered = OFFERED_COMMANDS.get(node)
+    if offered and full_name(offered, there):  # one of several: it heard what was applied
+        law = Ready(node, control)
+        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
+            inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
+        answers = tuple(offered if topic is VELOCITY_COMMAND else topic for topic in answers)
+    kept = tuple(topic for topic in answers if full_name(topic, there))
+    outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
     state, rows = None, []
     for stamp, signals in sorted(inputs.items()):
-        state, answer = control.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
+        state, answer = law.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
         if stamp in outputs:
             rows.append((outputs[stamp], answer))
     if not rows:
         raise InputError(f"{bag}: no control period with all topics of {node}: not in lock step?")
-    return [
-        FieldComparison(
-            topic.name,
-            name,
-            field.unit,
-            np.array([recorded[name] for recorded, _ in rows if name in recorded], dtype=float),
-            np.array([answer[name] for recorded, answer in rows if name in recorded], dtype=float),
-        )
-        for topic in control.outputs
-        for name, field in topic.fields.items()
-    ]
+    return compared(answers, rows)
 
 
 def text(fields: list[FieldComparison], changed: Mapping[str, Any]) -> str:
@@ -106,7 +85,7 @@ def text(fields: list[FieldComparison], changed: Mapping[str, Any]) -> str:
     lines = []
     if changed:
         given = ", ".join(f"{name} = {value}" for name, value in changed.items())
-        lines.append(f"with {given}; open loop: the machine does not answer")
+        lines.append(f"with {given}; open loop: what it is fed stays as recorded")
     wide = max(len(field.name) for field in fields)
     return "\n".join([*lines, *(f"  {field.name:{wide}}  {_line(field)}" for field in fields)])
 
@@ -116,11 +95,6 @@ def _line(field: FieldComparison) -> str:
         return "   not recorded"
     difference = f"largest difference {field.largest_difference:.3g} {field.unit}"
     return f"{field.equal:>6} of {field.recorded.size} equal, {difference}"
-
-
-def same(fields: list[FieldComparison]) -> bool:
-    """Return whether every sample agrees in every bit."""
-    return all(field.equal == field.recorded.size for field in fields)
 
 
 def _recorded_parameters(bag: Path, node: str, about: Mapping[str, str]) -> Values:
@@ -156,31 +130,3 @@ def _design(output: str, values: Values) -> PfcParameters:
     design = pfc_file.load(Path(str(file)) if file else pfc_file.default_file(output), output)
     words = {name: values.pop(name) for name in ("form", "future") if name in values}
     return with_values(replace(design, **words), values)
-
-
-def _by_stamp(bag: Path, topics: tuple[Topic, ...]) -> dict[int, dict[str, float]]:
-    """Return the signals of each control period in which every topic was recorded."""
-    there = bags.recorded_topics(bag)
-    names = {topic.name: full_name(topic, there) for topic in topics}
-    for name, full in names.items():
-        if full is None:
-            raise InputError(f"{bag}: no topic {name}; there are {', '.join(sorted(there))}")
-    messages = bags.read(bag, {full for full in names.values() if full})
-    found: list[dict[int, dict[str, float]]] = []
-    for topic in topics:
-        full = names[topic.name] or ""
-        try:
-            found.append(
-                {
-                    message.stamp: conversions.values(topic, message.data)
-                    for message in messages[full]
-                    if message.stamp % CONTROL_PERIOD_NS == 0
-                }
-            )
-        except LookupError as error:
-            raise InputError(f"{bag}: {full}: {error}") from None
-    stamps = set(found[0]).intersection(*found[1:])
-    return {
-        stamp: {name: value for of_topic in found for name, value in of_topic[stamp].items()}
-        for stamp in stamps
-    }

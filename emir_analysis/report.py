@@ -1,4 +1,4 @@
-"""A report as one self-contained HTML file: text, tables and pictures, nothing to download."""
+"""A report as one self-contained HTML file: text, tables, pictures, plots; nothing to download."""
 
 import base64
 import html
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import plotly.graph_objects as go
+import plotly.io
 from matplotlib.figure import Figure
 
 from emir_analysis.errors import InputError
@@ -67,7 +69,15 @@ class Picture:
     caption: str = ""
 
 
-Block = Heading | Text | Table | Picture
+@dataclass(frozen=True)
+class Plot:
+    """A plotly figure: whoever reads it can zoom, pan and read off values."""
+
+    figure: go.Figure
+    caption: str = ""
+
+
+Block = Heading | Text | Table | Picture | Plot
 
 
 def new_figure(height: float) -> Figure:
@@ -80,7 +90,11 @@ def write_html(path: Path, title: str, blocks: Sequence[Block]) -> None:
 
     Raises InputError when the file cannot be written.
     """
-    body = "\n".join(_html(block) for block in blocks)
+    plots = [block for block in blocks if isinstance(block, Plot)]
+    body = "\n".join(
+        _plot(block, plots.index(block)) if isinstance(block, Plot) else _html(block)
+        for block in blocks
+    )
     page = (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -93,7 +107,7 @@ def write_html(path: Path, title: str, blocks: Sequence[Block]) -> None:
         raise InputError(f"{path}: {error.strerror}") from None
 
 
-def _html(block: Block) -> str:
+def _html(block: Heading | Text | Table | Picture) -> str:
     match block:
         case Heading(text):
             return f"<h2>{html.escape(text)}</h2>"
@@ -138,3 +152,15 @@ def _picture(picture: Picture) -> str:
         f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
         f"<figcaption>{caption}</figcaption></figure>"
     )
+
+
+def _plot(plot: Plot, number: int) -> str:
+    """Return a plot; the first brings plotly's code, which draws all of them."""
+    drawn = plotly.io.to_html(
+        plot.figure,
+        full_html=False,
+        include_plotlyjs=number == 0,
+        div_id=f"plot{number}",
+        config={"displaylogo": False, "responsive": True},
+    )
+    return f"<figure>{drawn}<figcaption>{html.escape(plot.caption)}</figcaption></figure>"

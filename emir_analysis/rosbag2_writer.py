@@ -1,7 +1,10 @@
-"""A recording in rosbag2's own form: an MCAP file of CDR messages and metadata.yaml (version 9)."""
+"""A recording in rosbag2's own form: MCAP files of CDR messages and metadata.yaml (version 9)."""
 
+import math
 import shutil
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,7 +16,12 @@ from mcap.writer import CompressionType, Writer
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 
-CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose
+CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose between two flushes
+COMPRESSIONS = {"none": CompressionType.NONE, "zstd": CompressionType.ZSTD}
+
+
+class WriteError(RuntimeError):
+    """The recording cannot be written on; what was written is readable. One line."""
 
 
 class _Plain(yaml.SafeDumper):
@@ -33,38 +41,103 @@ def channel_metadata(qos: list[dict[str, Any]], type_hash: str) -> dict[str, str
 
 
 @dataclass
-class Channel:
-    """A topic of the recording."""
+class Topic:
+    """A topic of the recording. metadata: rosbag2's (QoS as YAML, type hash) and ours."""
 
-    topic: str
-    type: str
-    metadata: dict[str, str]  # of rosbag2: QoS as YAML, type hash
-    id: int
+    name: str
+    schema: Schema
+    metadata: dict[str, str]
     count: int = 0
 
 
+@dataclass
+class _Span:
+    """How many messages there are, and their first and last log time, ns."""
+
+    count: int = 0
+    start: int | None = None
+    end: int = 0
+
+    @property
+    def duration(self) -> int:
+        return 0 if self.start is None else self.end - self.start
+
+    def add(self, time: int) -> None:
+        self.count += 1
+        self.start = time if self.start is None else min(self.start, time)
+        self.end = max(self.end, time)
+
+
+class _File:
+    """One MCAP file of a recording; every file repeats what describes the recording."""
+
+    def __init__(self, path: Path, compression: CompressionType) -> None:
+        self.path = path
+        self.span = _Span()
+        self.stream = path.open("wb")
+        self.writer = Writer(self.stream, chunk_size=CHUNK, compression=compression)
+        self.writer.start(profile="ros2", library=f"emir {software_version()}")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    def announce(self, topic: Topic) -> None:
+        schema = topic.schema
+        if schema.name not in self._schemas:
+            self._schemas[schema.name] = self.writer.register_schema(
+                name=schema.name, encoding=schema.encoding, data=schema.data
+            )
+        self._channels[topic.name] = self.writer.register_channel(
+            topic=topic.name,
+            message_encoding="cdr",
+            schema_id=self._schemas[schema.name],
+            metadata=topic.metadata,
+        )
+
+    def attach(self, a: Attachment) -> None:
+        self.writer.add_attachment(a.create_time, a.log_time, a.name, a.media_type, a.data)
+
+    def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
+        number = self._channels[topic.name]
+        self.writer.add_message(number, log_time, data, publish_time, topic.count)
+        self.span.add(log_time)
+
+    def finish(self) -> None:
+        self.writer.finish()  # type: ignore[no-untyped-call]  # mcap's, untyped
+        self.stream.close()
+
+
+@dataclass
 class Rosbag2Writer:
     """Writes serialized messages as they came.
 
+    compression: of the chunks in the files, a key of COMPRESSIONS. max_size (bytes) and
+    max_duration (s, of log time): a new file is begun where the present one reaches them.
     The folder must not exist: a recording is never written over. Raises ParameterError then.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    folder: Path
+    compression: str = "none"
+    max_size: float = math.inf
+    max_duration: float = math.inf
+    _topics: dict[str, Topic] = field(default_factory=dict, init=False)
+    _metadata: dict[str, dict[str, str]] = field(default_factory=dict, init=False)
+    _attachments: list[Attachment] = field(default_factory=list, init=False)
+    _finished: list[_File] = field(default_factory=list, init=False)
+    _closed: bool = field(default=False, init=False)
+    _span: _Span = field(default_factory=_Span, init=False)
+
+    def __post_init__(self) -> None:
+        if self.compression not in COMPRESSIONS:
+            raise ParameterError(
+                f"compression {self.compression!r}: there are {', '.join(COMPRESSIONS)}"
+            )
         try:
-            folder.mkdir(parents=True)
+            self.folder.mkdir(parents=True)
         except FileExistsError:
-            raise ParameterError(f"{folder}: exists already, and is not overwritten") from None
+            raise ParameterError(f"{self.folder}: exists already, and is not overwritten") from None
         except OSError as error:
-            raise ParameterError(f"{folder}: {error.strerror}") from None
-        self._file = folder / f"{folder.name}_0.mcap"
-        self._stream = self._file.open("wb")
-        self._writer = Writer(self._stream, chunk_size=CHUNK, compression=CompressionType.NONE)
-        self._writer.start(profile="ros2", library=f"emir {software_version()}")
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, Channel] = {}
-        self._start: int | None = None
-        self._end = 0
+            raise ParameterError(f"{self.folder}: {error.strerror}") from None
+        self._file = self._next_file()
 
     def __enter__(self) -> Self:
         return self
@@ -80,107 +153,145 @@ class Rosbag2Writer:
     @property
     def topics(self) -> set[str]:
         """Return the full names of the topics announced."""
-        return set(self._channels)
+        return set(self._topics)
 
     @property
     def message_count(self) -> int:
         """Return how many messages were written."""
-        return sum(channel.count for channel in self._channels.values())
+        return self._span.count
 
     @property
     def duration_ns(self) -> int:
         """Return the time between first and last message, ns."""
-        return 0 if self._start is None else self._end - self._start
+        return self._span.duration
 
-    def add_topic(self, topic: str, schema: Schema, metadata: dict[str, str]) -> None:
+    def add_topic(self, name: str, schema: Schema, metadata: dict[str, str]) -> None:
         """Announce a topic by its full name.
 
         schema: name, encoding and text of the type; its id is not used. metadata: as
         `channel_metadata` returns it, or as it stands in another recording.
         """
-        if schema.name not in self._schemas:
-            self._schemas[schema.name] = self._writer.register_schema(
-                name=schema.name, encoding=schema.encoding, data=schema.data
-            )
-        channel = self._writer.register_channel(
-            topic=topic,
-            message_encoding="cdr",
-            schema_id=self._schemas[schema.name],
-            metadata=metadata,
-        )
-        self._channels[topic] = Channel(topic, schema.name, metadata, channel)
+        self._topics[name] = Topic(name, schema, metadata)
+        self._file.announce(self._topics[name])
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
-        """Store a metadata record, texts by key, in the MCAP file."""
-        self._writer.add_metadata(name, data)
+        """Store a metadata record, texts by key, in the MCAP files."""
+        self._metadata[name] = data
+        self._file.writer.add_metadata(name, data)
 
-    def add_attachment(self, a: Attachment) -> None:
-        """Store an attachment in the MCAP file."""
-        self._writer.add_attachment(a.create_time, a.log_time, a.name, a.media_type, a.data)
+    def add_attachment(self, attachment: Attachment) -> None:
+        """Store an attachment in the MCAP files."""
+        self._attachments.append(attachment)
+        self._file.attach(attachment)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        """Store one message; times in ns."""
-        channel = self._channels[topic]
-        self._writer.add_message(channel.id, log_time, data, publish_time, channel.count)
-        channel.count += 1
-        self._start = log_time if self._start is None else min(self._start, log_time)
-        self._end = max(self._end, log_time)
+        """Store one message; times in ns. Raises WriteError, such as for a full disk."""
+        with self._watched():
+            if self._is_full(log_time):
+                self._split()
+            entry = self._topics[topic]
+            self._file.write(entry, data, log_time, publish_time)
+        entry.count += 1
+        self._span.add(log_time)
+
+    def flush(self) -> None:
+        """Hand all that was written to the operating system: it outlives this process.
+
+        Raises WriteError.
+        """
+        with self._watched():
+            self._file.writer.flush()  # type: ignore[no-untyped-call]  # mcap's, untyped
 
     def close(self) -> None:
-        """Finish the file and write metadata.yaml; without a message, leave no folder behind.
+        """Finish the files and write metadata.yaml; without a message, leave no folder behind.
 
-        A second call does nothing.
+        A second call does nothing, nor does one after a WriteError. Raises WriteError.
         """
-        if self._stream.closed:
+        if self._closed:
             return
-        text = _yaml(self._metadata())
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
-        self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's, untyped
-        self._stream.close()
-        (self.folder / "metadata.yaml").write_text(text)
+        self._closed = True
+        text = _yaml(self._description([*self._finished, self._file]))
+        with self._watched():
+            self._file.writer.add_metadata("rosbag2", {"serialized_metadata": text})
+            self._file.finish()
+            (self.folder / "metadata.yaml").write_text(text)
         if not self.message_count:
             shutil.rmtree(self.folder)
 
-    def _metadata(self) -> dict[str, Any]:
-        start = {"nanoseconds_since_epoch": self._start or 0}
-        duration = {"nanoseconds": self.duration_ns}
-        topics = [
-            {
-                "topic_metadata": {
-                    "name": channel.topic,
-                    "type": channel.type,
-                    "serialization_format": "cdr",
-                    "offered_qos_profiles": _qos(channel),
-                    "type_description_hash": channel.metadata.get("topic_type_hash", ""),
-                },
-                "message_count": channel.count,
-            }
-            for channel in self._channels.values()
-        ]
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Give up writing when it fails; the file keeps what is in it."""
+        try:
+            yield
+        except OSError as error:
+            self._closed = True
+            with suppress(OSError):  # it tries once more to write what it still holds
+                self._file.stream.close()
+            raise WriteError(
+                f"{self._file.path}: {error.strerror}: recording ended;"
+                " what came before it is kept (emir bag recover)"
+            ) from None
+
+    def _is_full(self, time: int) -> bool:
+        span = self._file.span
+        if span.start is None:
+            return False
+        too_long = (time - span.start) * 1e-9 >= self.max_duration
+        return too_long or self._file.stream.tell() >= self.max_size
+
+    def _split(self) -> None:
+        self._file.finish()
+        self._finished.append(self._file)
+        self._file = self._next_file()
+
+    def _next_file(self) -> _File:
+        path = self.folder / f"{self.folder.name}_{len(self._finished)}.mcap"
+        file = _File(path, COMPRESSIONS[self.compression])
+        for name, data in self._metadata.items():
+            file.writer.add_metadata(name, data)
+        for attachment in self._attachments:
+            file.attach(attachment)
+        for topic in self._topics.values():
+            file.announce(topic)
+        return file
+
+    def _description(self, files: list[_File]) -> dict[str, Any]:
         return {
             "rosbag2_bagfile_information": {
                 "version": 9,
                 "storage_identifier": "mcap",
-                "duration": duration,
-                "starting_time": start,
-                "message_count": self.message_count,
-                "topics_with_message_count": topics,
-                "compression_format": "",
+                **_times(self._span),
+                "topics_with_message_count": [_counted(t) for t in self._topics.values()],
+                "compression_format": "",  # of whole files; chunks say for themselves
                 "compression_mode": "",
-                "relative_file_paths": [self._file.name],
-                "files": [
-                    {
-                        "path": self._file.name,
-                        "starting_time": start,
-                        "duration": duration,
-                        "message_count": self.message_count,
-                    }
-                ],
+                "relative_file_paths": [file.path.name for file in files],
+                "files": [{"path": file.path.name, **_times(file.span)} for file in files],
                 "custom_data": None,
                 "ros_distro": "jazzy",
             }
         }
 
 
-def _qos(channel: Channel) -> list[dict[str, Any]]:
-    return yaml.safe_load(channel.metadata.get("offered_qos_profiles", "")) or []
+def _times(span: _Span) -> dict[str, Any]:
+    return {
+        "duration": {"nanoseconds": span.duration},
+        "starting_time": {"nanoseconds_since_epoch": span.start or 0},
+        "message_count": span.count,
+    }
+
+
+def _counted(topic: Topic) -> dict[str, Any]:
+    return {
+        "topic_metadata": {
+            "name": topic.name,
+            "type": topic.schema.name,
+            "serialization_format": "cdr",
+            "offered_qos_profiles": _qos(topic),
+            "type_description_hash": topic.metadata.get("topic_type_hash", ""),
+        },
+        "message_count": topic.count,
+    }
+
+
+def _qos(topic: Topic) -> list[dict[str, Any]]:
+    return yaml.safe_load(topic.metadata.get("offered_qos_profiles", "")) or []

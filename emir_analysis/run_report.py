@@ -1,17 +1,18 @@
-"""The figures of a run of the graph: as text, JSON and an HTML report with pictures."""
+"""The figures of runs of the graph: as text, JSON, CSV and an HTML report with plots."""
 
+import csv
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from typing import Any
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
-from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
+from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
+from emir_analysis.run_plots import HYDRAULICS, MOTION, plot
 from emir_analysis.run_signals import load_run
 from emir_analysis.signals import Recording
 
@@ -35,7 +36,7 @@ def analyze(bag: Path) -> RunAnalysis:
 
 
 def text(run: RunAnalysis) -> str:
-    """Return the figures as lines of text."""
+    """Return the figures of one run as lines of text."""
     rows = [(m.name, *_shown(m), m.meaning) for m in run.metrics]
     wide = max(len(row[0]) for row in rows)
     lines = [
@@ -44,33 +45,91 @@ def text(run: RunAnalysis) -> str:
     return "\n".join([f"figures of {run.bag}:", *lines])
 
 
-def write_json(run: RunAnalysis, file: Path) -> None:
-    """Write figures and description as JSON. Raises InputError when that fails."""
-    content = {
-        "bag": str(run.bag),
-        "about": run.about,
-        "metrics": {m.name: {k: v for k, v in asdict(m).items() if k != "name"}
-                    for m in run.metrics},
-    }  # fmt: skip
+def comparison(runs: Sequence[RunAnalysis]) -> str:
+    """Return the figures of several runs side by side as lines of text."""
+    names = _names(runs)
+    wide = max(len(m.name) for m in runs[0].metrics)
+    columns = [max(9, len(name)) for name in names]
+    title = "  ".join(f"{name:>{w}}" for name, w in zip(names, columns, strict=True))
+    lines = [f"  {'':{wide}}  {title}"]
+    for of_all in zip(*(run.metrics for run in runs), strict=True):
+        cells = [_shown(m)[0] for m in of_all]
+        values = "  ".join(f"{cell:>{w}}" for cell, w in zip(cells, columns, strict=True))
+        lines.append(f"  {of_all[0].name:{wide}}  {values} {_shown(of_all[0])[1]}")
+    return "\n".join(lines)
+
+
+def write_json(runs: Sequence[RunAnalysis], file: Path) -> None:
+    """Write figures and descriptions as JSON: of one run, or `runs` with one entry each.
+
+    Raises InputError when that fails.
+    """
+    entries: list[dict[str, Any]] = [
+        {
+            "bag": str(run.bag),
+            "about": run.about,
+            "metrics": {
+                m.name: {k: v for k, v in asdict(m).items() if k != "name"} for m in run.metrics
+            },
+        }
+        for run in runs
+    ]
+    content = entries[0] if len(entries) == 1 else {"runs": entries}
     try:
         file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
 
 
-def write_report(run: RunAnalysis, file: Path) -> None:
-    """Write the HTML report. Raises InputError when that fails."""
-    figures = [(m.name, *_shown(m), m.meaning) for m in run.metrics]
+def write_csv(runs: Sequence[RunAnalysis], file: Path) -> None:
+    """Write one line a run: bag, its description, figures as `name [unit]` in SI units.
+
+    Raises InputError when that fails.
+    """
+    told = sorted({key for run in runs for key in run.about} - {"parameters"})
+    figures = [f"{m.name} [{m.unit}]" for m in runs[0].metrics]
+    try:
+        with file.open("w", encoding="utf-8", newline="") as stream:
+            table = csv.writer(stream)
+            table.writerow(["bag", *told, *figures])
+            for run in runs:
+                about = [run.about.get(key, "") for key in told]
+                table.writerow([run.bag, *about, *(m.value for m in run.metrics)])
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
+
+
+def write_report(runs: Sequence[RunAnalysis], file: Path) -> None:
+    """Write the HTML report, several runs in the same plots. Raises InputError when that fails."""
+    names = _names(runs)
+    recordings = {name: run.recording for name, run in zip(names, runs, strict=True)}
     blocks: list[Block] = [
-        Text(_headline(run), lead=True),
-        Picture(_motion(run.recording), "Piston and TCP. The paper's Fig. 9 shows these two."),
-        Picture(_hydraulics(run.recording), "Valve, chamber pressures and safety logic block."),
+        *(_headline(runs[0]) if len(runs) == 1 else ()),
+        Plot(plot(MOTION, recordings), "Piston and TCP. The paper's Fig. 9 shows the lower two."),
+        Plot(plot(HYDRAULICS, recordings), "Valve, chamber pressures and safety logic block."),
         Heading("Figures"),
-        Table(("figure", "value", "unit", "meaning"), figures),
-        Heading("About this recording"),
-        Table(("", ""), list(run.about.items())) if run.about else Text("It says nothing."),
+        _figures(names, runs),
     ]
-    write_html(file, f"EMIR run: {run.bag.name}", blocks)
+    for name, run in zip(names, runs, strict=True):
+        blocks.append(Heading(f"About {name}" if len(runs) > 1 else "About this recording"))
+        told = list(run.about.items())
+        blocks.append(Table(("", ""), told) if told else Text("It says nothing."))
+    write_html(file, f"EMIR run: {', '.join(names)}", blocks)
+
+
+def _names(runs: Sequence[RunAnalysis]) -> list[str]:
+    """Return a name for each run: its folder's, or its path where folders are alike."""
+    short = [run.bag.resolve().name for run in runs]
+    return short if len(set(short)) == len(short) else [str(run.bag) for run in runs]
+
+
+def _figures(names: Sequence[str], runs: Sequence[RunAnalysis]) -> Table:
+    rows = [
+        (of_all[0].name, *(_shown(m)[0] for m in of_all), _shown(of_all[0])[1], of_all[0].meaning)
+        for of_all in zip(*(run.metrics for run in runs), strict=True)
+    ]
+    values = names if len(runs) > 1 else ["value"]
+    return Table(("figure", *values, "unit", "meaning"), rows)
 
 
 def _shown(metric: Metric) -> tuple[str, str]:
@@ -82,65 +141,16 @@ def _shown(metric: Metric) -> tuple[str, str]:
     return f"{metric.value * factor:.{min(digits, 3)}f}", unit
 
 
-def _headline(run: RunAnalysis) -> str:
+def _headline(run: RunAnalysis) -> tuple[Text]:
     by_name = {m.name: m for m in run.metrics}
 
     def say(name: str) -> str:
         return " ".join(_shown(by_name[name]))
 
-    return (
+    said = (
         f"The stroke follows its reference with at most {say('tracking_error_peak')} of error"
         f" ({say('lag_plateau')} of delay at constant velocity). The TCP bends"
         f" {say('tcp_deflection_up')} up and {say('tcp_deflection_down')} down about"
         f" {say('tcp_deflection_static')} at rest."
     )
-
-
-def _motion(run: Recording) -> Figure:
-    figure = new_figure(7.0)
-    stroke, velocity, tcp = figure.subplots(3, 1, sharex=True)
-    _line(stroke, run, "reference_stroke", 1e3, "wanted")
-    _line(stroke, run, "true_stroke" if "true_stroke" in run.signals else "stroke", 1e3, "piston")
-    stroke.set_ylabel("stroke / mm")
-    _line(velocity, run, "reference_velocity", 1e3, "wanted")
-    _line(velocity, run, "true_velocity", 1e3, "piston")
-    velocity.set_ylabel("velocity / mm/s")
-    _line(tcp, run, "tcp_deflection", 1e2, "TCP off the straight boom")
-    tcp.set_ylabel("deflection / cm")
-    return _finished(figure)
-
-
-def _hydraulics(run: Recording) -> Figure:
-    figure = new_figure(6.0)
-    valve, pressure, logic = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1))
-    _line(valve, run, "valve_command", 100.0, "command y2")
-    valve.lines[-1].set_drawstyle("steps-post")  # held from one message to the next
-    valve.set_ylabel("valve / %")
-    _line(pressure, run, "pressure_lifting", 1e-5, "lifting chamber")
-    _line(pressure, run, "pressure_lowering", 1e-5, "lowering chamber")
-    pressure.set_ylabel("pressure / bar")
-    _line(logic, run, "logic_block", 100.0, "logic block y4")
-    logic.set_ylabel("open / %")
-    logic.set_ylim(-5.0, 105.0)
-    return _finished(figure)
-
-
-def _line(axes: Axes, run: Recording, name: str, factor: float, label: str) -> None:
-    if name in run.signals:
-        color = "0.5" if name.startswith("reference") else None
-        axes.plot(run[name].time, run[name].value * factor, label=label, color=color, lw=1.2)
-
-
-def _finished(figure: Figure) -> Figure:
-    for axes in figure.axes:
-        axes.grid(visible=True, alpha=0.3)
-        if axes.lines:
-            axes.legend(
-                loc="lower right",
-                bbox_to_anchor=(1.0, 0.98),  # above the axes, where nothing is hidden
-                ncols=len(axes.lines),
-                frameon=False,
-                fontsize="small",
-            )
-    figure.axes[-1].set_xlabel("time / s")
-    return figure
+    return (Text(said, lead=True),)

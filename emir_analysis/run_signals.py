@@ -9,8 +9,10 @@ from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Recording, Source, load
 from emir_msgs_py.topics import (
+    BOOM_DEFLECTION,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
+    JOINT_STATES,
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
     TRUTH,
@@ -19,7 +21,7 @@ from emir_msgs_py.topics import (
 )
 
 NEEDED = (CYLINDER_STATES, CYLINDER_REFERENCE, VALVE_COMMAND, PRESSURE_LIFTING, PRESSURE_LOWERING)
-OPTIONAL = (TRUTH,)  # a real machine has none
+OPTIONAL = (JOINT_STATES, BOOM_DEFLECTION, TRUTH)  # a real machine has no truth
 
 Array = NDArray[np.float64]
 

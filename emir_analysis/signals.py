@@ -17,6 +17,7 @@ from emir_common.yaml_file import read_map
 Array = NDArray[np.float64]
 
 FEWEST_SAMPLES = 2
+TIME = "time"  # the entry of a signal map that is no signal: where a table has its times
 
 
 class Source(NamedTuple):
@@ -73,7 +74,9 @@ def read_signal_map(file: Path) -> dict[str, Source]:
         content = read_map(file, what="signals")
     except ParameterError as error:
         raise InputError(str(error)) from None
-    return {str(name): _source(file, name, entry) for name, entry in content.items()}
+    return {
+        str(name): _source(file, name, entry) for name, entry in content.items() if name != TIME
+    }
 
 
 def _source(file: Path, name: str, entry: Any) -> Source:

@@ -22,15 +22,18 @@ class Quantity:
     high: float
     meaning: str
 
+    @property
+    def allowed(self) -> str:
+        """Return the range with its unit."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.low:g} ... {self.high:g}{unit}"
+
     def check(self, name: str, value: float) -> None:
         """Raise ParameterError unless `value` is a finite number inside the range."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{name} = {value!r}: not a number")
         if not math.isfinite(value) or not self.low <= value <= self.high:
-            unit = "" if self.unit == "1" else f" {self.unit}"
-            raise ParameterError(
-                f"{name} = {value:g}: outside {self.low:g} ... {self.high:g}{unit}"
-            )
+            raise ParameterError(f"{name} = {value:g}: outside {self.allowed}")
 
 
 def quantity(

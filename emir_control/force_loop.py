@@ -6,12 +6,18 @@ from typing import NamedTuple
 
 from emir_common.quantity import check_ranges, quantity
 from emir_control.filters import low_pass
-from emir_control.prefilter import PrefilterParameters, piston_velocity, valve_command
+from emir_control.limits import LimitParameters, limited, off_the_ends
+from emir_control.prefilter import (
+    PrefilterParameters,
+    piston_stroke,
+    piston_velocity,
+    valve_command,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ForceLoopParameters:
-    """High pass (10) and prefilter.
+    """High pass (10), prefilter and the limits of what is wanted.
 
     The gain is g / k_h with k_h = beta (A_H^2/V_H + A_S^2/V_S), 5.7e7 N/m at 45 deg; the slow
     mode gets a damping of about g / (2 omega): 8.8e-8 m/(s N) is g = 5 1/s, 0.57 of critical.
@@ -20,15 +26,17 @@ class ForceLoopParameters:
     gain: float = quantity("m/(s N)", 0.0, 1e-5, "k_F", default=8.8e-8)
     time_constant: float = quantity("s", 0.01, 60.0, "T_H, of the high pass", default=1.0)
     prefilter: PrefilterParameters = field(default_factory=PrefilterParameters)
+    limits: LimitParameters = field(default_factory=LimitParameters)
 
     def __post_init__(self) -> None:
         check_ranges(self)
 
 
 class ForceLoopState(NamedTuple):
-    """The slow part of the force, which the high pass takes away."""
+    """The slow part of the force, which the high pass takes away, and the last wanted velocity."""
 
     static_force: float  # N
+    wanted: float = 0.0  # m/s, within the limits
 
 
 class ForceLoopInputs(NamedTuple):
@@ -52,6 +60,7 @@ class ForceLoopOutputs(NamedTuple):
     feedback: float  # velocity taken off for damping, m/s (10)
     velocity: float  # wanted piston velocity behind the feedback, m/s
     saturated: bool  # the valve is fully open
+    limited: bool = False  # speed, its change or an end of the stroke
 
 
 @dataclass(frozen=True)
@@ -60,29 +69,35 @@ class ForceLoop:
 
     parameters: ForceLoopParameters
 
-    def initial(self, inputs: ForceLoopInputs) -> ForceLoopState:
-        """Return the state in which the force has been what it is for long."""
-        return ForceLoopState(self._force(inputs))
+    def initial(self, inputs: ForceLoopInputs, velocity: float = 0.0) -> ForceLoopState:
+        """Return the state in which force and wanted velocity, m/s, have been such for long."""
+        return ForceLoopState(self._force(inputs), velocity)
 
     def step(
         self, state: ForceLoopState, inputs: ForceLoopInputs, dt: float
     ) -> tuple[ForceLoopState, ForceLoopOutputs]:
         """Return the valve command of this control period of dt, s.
 
-        An input that is not a number shuts the valve and leaves the state as it was.
+        An input that is not a number shuts the valve and leaves the force's state as it was.
         """
         if not all(math.isfinite(value) for value in inputs):
-            return state, ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
+            return state._replace(wanted=0.0), ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
         p = self.parameters
+        if not math.isfinite(state.static_force):  # begun without a measurement
+            state = self.initial(inputs, state.wanted)
         force = self._force(inputs)
         static_force = low_pass(state.static_force, force, p.time_constant, dt)
         feedback = p.gain * (force - static_force)
         wanted = inputs.velocity_command
         wanted += piston_velocity(inputs.joint_rate_command, inputs.angle, p.prefilter)
-        velocity = wanted - feedback
+        stroke = piston_stroke(inputs.angle, p.prefilter)
+        allowed = limited(wanted, state.wanted, stroke, dt, p.limits)
+        velocity = off_the_ends(allowed - feedback, stroke, 0.0, p.limits)  # damping moves, too
         command = valve_command(velocity, p.prefilter)
-        outputs = ForceLoopOutputs(command, force, feedback, velocity, abs(command) >= 1.0)
-        return ForceLoopState(static_force), outputs
+        outputs = ForceLoopOutputs(
+            command, force, feedback, velocity, abs(command) >= 1.0, velocity != wanted - feedback
+        )
+        return ForceLoopState(static_force, allowed), outputs
 
     def _force(self, inputs: ForceLoopInputs) -> float:
         p = self.parameters.prefilter

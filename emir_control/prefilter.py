@@ -48,14 +48,18 @@ def valve_command(velocity: float, p: PrefilterParameters) -> float:
     return math.copysign(beyond, velocity)
 
 
+def piston_stroke(angle: float, p: PrefilterParameters) -> float:
+    """Return the piston stroke, m, at a joint angle, rad; stroke 0 is at angle 0 (1)."""
+    return _length(angle, p) - _length(0.0, p)
+
+
 def joint_angle(stroke: float, p: PrefilterParameters) -> float:
     """Return the joint angle, rad, at a piston stroke, m; stroke 0 is at angle 0 (1).
 
     Not a number where the triangle does not close.
     """
     a, b = p.triangle_a, p.triangle_b
-    shortest = a * a + b * b - 2.0 * a * b * math.cos(p.triangle_gamma0)
-    length = math.sqrt(shortest) + stroke
+    length = _length(0.0, p) + stroke
     cosine = (a * a + b * b - length * length) / (2.0 * a * b)
     if not abs(cosine) <= 1.0:
         return math.nan
@@ -65,5 +69,10 @@ def joint_angle(stroke: float, p: PrefilterParameters) -> float:
 def piston_velocity(joint_rate: float, angle: float, p: PrefilterParameters) -> float:
     """Return the piston velocity, m/s, for a joint rate, rad/s, at the joint angle, rad (1)."""
     a, b, opening = p.triangle_a, p.triangle_b, angle + p.triangle_gamma0
-    length = math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(opening))
-    return joint_rate * a * b * math.sin(opening) / length
+    return joint_rate * a * b * math.sin(opening) / _length(angle, p)
+
+
+def _length(angle: float, p: PrefilterParameters) -> float:
+    """Return the distance from cylinder foot to rod eye, m."""
+    a, b = p.triangle_a, p.triangle_b
+    return math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(angle + p.triangle_gamma0))

@@ -6,12 +6,25 @@ from typing import NamedTuple
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 
+HALF_OF_PAUSE = 0.5  # after that the next move counts as the one to come
+
 
 class Reference(NamedTuple):
     """The desired piston motion at one instant."""
 
     stroke: float  # h_d, m
     velocity: float  # dh_d/dt, m/s
+
+
+class Move(NamedTuple):
+    """The move under way, or the next one."""
+
+    since: float  # s since its start, negative before
+    duration: float  # s
+    distance: float  # m
+
+
+NO_MOVE = Move(-math.inf, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -116,6 +129,15 @@ class AwayAndBack:
     def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
         """Return the strokes, m, of the `count` periods that follow the next step's own."""
         return tuple(self._at(state, (state.ticks + k) * dt).stroke for k in range(1, count + 1))
+
+    def move(self, state: TrajectoryState, dt: float) -> Move:
+        """Return the move of the next step's own time; before the way back, that back."""
+        p, duration = self.parameters, self._move.duration
+        since = state.ticks * dt - p.delay
+        back = since - duration - p.pause
+        if back >= -HALF_OF_PAUSE * p.pause:
+            return Move(back, duration, -p.distance)
+        return Move(since, duration, p.distance)
 
     def _at(self, state: TrajectoryState, time: float) -> Reference:
         """Return the reference `time` s after the start."""

@@ -148,7 +148,24 @@ VELOCITY_COMMAND = Topic(
     {"velocity_command": Field("velocity[0]", "m/s")},
     ("cylinder1",),
     "cylinder1",
-    ("pfc_node", "pfc_tip_node"),
+    ("pfc_node", "pfc_tip_node", "selector_node"),
+)
+OUTER_LOOPS = tuple(  # their names; several at once: selector_node chooses, the others are ready
+    node.removesuffix("_node") for node in VELOCITY_COMMAND.publishers if node != "selector_node"
+)
+OFFERED_COMMANDS = {
+    name: Topic(
+        f"{name}/velocity_command", JOINT_STATE, f"{name}_node", "control", "command",
+        {f"{name}_command": Field("velocity[0]", "m/s")}, ("cylinder1",), "cylinder1",
+    )
+    for name in OUTER_LOOPS
+}  # fmt: skip
+SELECTOR_TERMS = _named_numbers(
+    "selector/terms",
+    "selector_node",
+    "control",
+    {"applied_command": "m/s"} | {f"{name}_active": "1" for name in OUTER_LOOPS},
+    "command",
 )
 VALVE_COMMAND = Topic(
     "valve_command",
@@ -190,6 +207,7 @@ TOPICS: tuple[Topic, ...] = (
     JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING, BOOM_DEFLECTION, TRUTH,
     CYLINDER_REFERENCE, CYLINDER_PREVIEW, VELOCITY_COMMAND, VALVE_COMMAND,
     CASCADE_TERMS, PFC_TERMS, PFC_TIP_TERMS, FORCE_LOOP_TERMS,
+    *OFFERED_COMMANDS.values(), SELECTOR_TERMS,
 )  # fmt: skip
 
 RECORDED = "recorder/recorded"  # std_msgs/Header: all up to this stamp is in the file (lock step)

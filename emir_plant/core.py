@@ -216,19 +216,23 @@ def truth(x: Array, parameters: NDArray[Any]) -> Truth:
 
 
 @compiled
-def advance(x: Array, command: float, dt: float, parameters: NDArray[Any]) -> Array:
-    """Return the state after dt, s, under a constant command; RK4 in steps of at most STEP."""
+def advance(
+    x: Array, command: float, dt: float, parameters: NDArray[Any], step: float = STEP
+) -> Array:
+    """Return the state after dt, s, under a constant command; RK4 in steps of at most `step`, s."""
     after = x.copy()
-    _advance(after, command, dt, parameters, np.zeros((5, x.size)))
+    _advance(after, command, dt, step, parameters, np.zeros((5, x.size)))
     return after
 
 
 @compiled
-def _advance(x: Array, command: float, dt: float, parameters: NDArray[Any], work: Array) -> None:
+def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
+    x: Array, command: float, dt: float, step: float, parameters: NDArray[Any], work: Array
+) -> None:
     """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
     p = parameters[0]
-    steps = max(1, math.ceil(dt / STEP - 1e-9))
+    steps = max(1, math.ceil(dt / step - 1e-9))
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
@@ -264,11 +268,18 @@ def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) ->
 
 
 @compiled
-def simulate(x: Array, commands: Array, dt: float, every: int, parameters: NDArray[Any]) -> Array:
+def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array,
+    commands: Array,
+    dt: float,
+    every: int,
+    parameters: NDArray[Any],
+    step: float = STEP,
+) -> Array:
     """Run a whole command sequence.
 
-    commands: (k,), each held for dt, s. Returns (1 + k // every, len(Truth)): the truth at the
-    start and after every `every` commands.
+    commands: (k,), each held for dt, s; step: as for `advance`. Returns
+    (1 + k // every, len(Truth)): the truth at the start and after every `every` commands.
     """
     result = np.empty((1 + commands.size // every, len(truth(x, parameters))))
     x, work = x.copy(), np.zeros((5, x.size))
@@ -277,7 +288,7 @@ def simulate(x: Array, commands: Array, dt: float, every: int, parameters: NDArr
             for i, value in enumerate(truth(x, parameters)):
                 result[k // every, i] = value
         if k < commands.size:
-            _advance(x, commands[k], dt, parameters, work)
+            _advance(x, commands[k], dt, step, parameters, work)
     return result
 
 

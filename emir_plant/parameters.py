@@ -67,6 +67,12 @@ class Valve:
     balance_pressure: float = quantity("Pa", 1e5, 5e6, "drop held over the metering edge")
     dead_zone: float = quantity("1", 0.0, 0.5, "overlap as a share of full stroke", default=0.10)
     damping: float = quantity("1", 0.05, 5.0, "of critical, of the spool", default=0.8)
+    balance_lowering: int = quantity(
+        "1", 0, 1, "pressure balance when lowering: 0 in the inlet, 1 in the return", default=0
+    )
+    limit_lowering: float = quantity(
+        "Pa", 1e5, 1e9, "highest pressure fed to the lowering chamber; 1e9: none", default=1e9
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,10 +3,12 @@
 An entry is `name: {value, unit, source, tol}`. `tol` is the maker's relative tolerance; an
 entry with a tolerance and no value stands for a factor of 1. Entries may be grouped as a map
 of plain numbers (`resolver: {bits: 12, span: 1.57}` means resolver_bits, resolver_span).
-Effects are switched on by name: `effects: {coulomb_friction: {force: 3.0e+3}}`.
+Effects are switched on by name: `effects: {coulomb_friction: {force: 3.0e+3}}`. A file may state
+only what differs from another one beside it: `based_on: joint1.yaml`.
 """
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -17,6 +19,8 @@ from emir_common.yaml_file import read_map
 from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
 
+BASED_ON = "based_on"
+MORE_TOLD = "sensors."  # where a data sheet may tell more, such as the recording's rate
 EFFECTS = "effects."  # in front of an effect's name in a dotted path
 
 
@@ -35,20 +39,54 @@ class Sheet:
 
 def joint1() -> Machine:
     """Return EMIR's main joint as the project states it (data/joint1.yaml)."""
-    return load_sheet(Path(str(files("emir_plant") / "data" / "joint1.yaml")), strict=True).machine
+    return load_sheet(data("joint1.yaml"), strict=True).machine
+
+
+def even_edges() -> Machine:
+    """Return it with the valve that steps as paper Fig. 7 says (data/joint1_even_edges.yaml)."""
+    return load_sheet(data("joint1_even_edges.yaml"), strict=True).machine
+
+
+def data(name: str) -> Path:
+    """Return a file that comes with the project."""
+    return Path(str(files("emir_plant") / "data" / name))
 
 
 def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     """Read a machine from YAML.
 
-    strict: every key has to be known. Raises ParameterError, naming file and key, for a file
-    that cannot be read, a missing or unknown key, another unit, a value outside its range.
+    strict: every key has to be known; else a data sheet may tell more about its sensors and have
+    headings. Raises ParameterError, naming file and key and what is allowed, for a file that
+    cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
     content = read_map(path, what="parameters")
+    base = content.pop(BASED_ON, None)
+    if base is not None:
+        content = _over(_base(path, base), content)
     try:
         return _sheet(content, strict=strict)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
+
+
+def _base(path: Path, name: Any) -> dict[str, Any]:
+    file = path.parent / str(name)
+    content = read_map(file, what="parameters")
+    if BASED_ON in content:
+        raise ParameterError(f"{path}: {BASED_ON}: {file} is itself based on another")
+    return content
+
+
+def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of both, a map's own entries prevailing over the base's."""
+    merged = dict(base)
+    for name, entry in own.items():
+        below = base.get(name)
+        if isinstance(below, dict) and isinstance(entry, dict) and "value" not in entry:
+            merged[name] = _over(below, entry)
+        else:
+            merged[name] = entry
+    return merged
 
 
 def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
@@ -64,10 +102,11 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         for g, kind in kinds.items()
         for name, about in quantities(kind).items()
     }
+    headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
     unknown = tuple(path for path in entries if path not in known)
-    wrong = unknown if strict else [path for path in unknown if path.startswith(EFFECTS)]
-    if wrong:
-        raise ParameterError(f"{wrong[0]}: there is no such parameter")
+    wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
+    for path in [*wrong, *(headings if strict else [])]:
+        raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
     values: dict[str, float] = {}
     for path, about in known.items():
         entry = entries.get(path)
@@ -87,6 +126,14 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     )
 
 
+def _there_are(path: str, known: Iterable[str]) -> str:
+    """Return a list of what stands in the same group, or of the groups."""
+    group = path.rpartition(".")[0]
+    names = [name.rpartition(".") for name in known]
+    inside = [name for where, _, name in names if where == group]
+    return f"there are {', '.join(inside or dict.fromkeys(where for where, _, _ in names))}"
+
+
 def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the groups of parameters in a file by dotted path, each effect being one.
 
@@ -97,7 +144,9 @@ def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
         raise ParameterError(f"effects = {effects!r}: not a map of effects by name")
     for name, members in effects.items():
         if name not in REGISTRY:
-            raise ParameterError(f"effects.{name}: there is no such effect")
+            raise ParameterError(
+                f"effects.{name}: there is no such effect; there are {', '.join(REGISTRY)}"
+            )
         if not isinstance(members, dict):
             raise ParameterError(f"effects.{name} = {members!r}: not a map of its parameters")
     others = {name: group for name, group in content.items() if isinstance(group, dict)}
@@ -133,5 +182,7 @@ def _group(kind: type[Any], name: str, values: dict[str, float]) -> Any:
     given = {f.name: values[f"{name}.{f.name}"] for f in fields if f"{name}.{f.name}" in values}
     for f in fields:
         if f.name not in given and f.default is dataclasses.MISSING:
-            raise ParameterError(f"{name}.{f.name}: missing")
+            raise ParameterError(
+                f"{name}.{f.name}: missing; allowed is {f.metadata['quantity'].allowed}"
+            )
     return kind(**given)

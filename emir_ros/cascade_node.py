@@ -15,7 +15,9 @@ class CascadeNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("cascade_node", CascadeControl.inputs, CascadeControl.outputs, arguments)
-        self.law = CascadeControl(Cascade(declare_tree(self, CascadeParameters())))
+        self.law = self.standing_by(
+            CascadeControl(Cascade(declare_tree(self, CascadeParameters())))
+        )
         self.state: Any = None
         reject_unknown(self)
 
@@ -23,6 +25,10 @@ class CascadeNode(ControlNode):
         """Return command and terms of this control period."""
         self.state, outputs = self.law.step(self.state, signals, dt)
         return outputs
+
+    def stale(self, missing: Sequence[str]) -> None:
+        """Publish nothing, so that the valve shuts; the smoothing starts anew afterwards."""
+        self.state = None
 
 
 def main() -> None:

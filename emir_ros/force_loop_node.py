@@ -5,31 +5,44 @@ from typing import Any
 
 from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
 
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
+# A command is due every period. Looked for every plant period, its absence shuts the valve
+# within the period in which it was due.
+TIMEOUT = 2e-9 * (CONTROL_PERIOD_NS - PLANT_PERIOD_NS // 2)  # s
 
 
 class ForceLoopNode(ControlNode):
     """velocity_command, joint_states, pressures -> valve_command, force_loop/terms.
 
-    Without fresh inputs it shuts the valve.
+    Without fresh inputs it shuts the valve, within a control period.
     """
+
+    consequence = "valve shut"
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__(
-            "force_loop_node", ForceLoopControl.inputs, ForceLoopControl.outputs, arguments
+            "force_loop_node", ForceLoopControl.inputs, ForceLoopControl.outputs, arguments, TIMEOUT
         )
         self.law = ForceLoopControl(ForceLoop(declare_tree(self, ForceLoopParameters())))
         self.state: Any = None
         reject_unknown(self)
+        if not self.lockstep:
+            self.start_timer(PLANT_PERIOD_NS * 1e-9, self._watch)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return command and terms of this control period."""
         self.state, outputs = self.law.step(self.state, signals, dt)
         return outputs
+
+    def _watch(self) -> None:
+        missing = self.missing()
+        if missing and self.state is not None:
+            self.without(missing)
 
     def stale(self, missing: Sequence[str]) -> Signals:
         """Return the command that shuts the valve; the damping starts anew afterwards."""

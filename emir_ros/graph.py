@@ -10,19 +10,21 @@ from typing import Any
 
 import yaml
 
+from emir_analysis.switching import Selector, Switch
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 from emir_common.yaml_file import read_map
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_msgs_py.topics import TOPICS
+from emir_msgs_py.topics import OFFERED_COMMANDS, TOPICS
 
 CONTROLLERS = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
 NODES = tuple(dict.fromkeys(  # each once
-    ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes), "plant_node")
+    ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
+     "selector_node", "plant_node")
 ))  # fmt: skip
 EVERY_NODE = "/**"
 
@@ -31,7 +33,8 @@ EVERY_NODE = "/**"
 class Plan:
     """What a run of the graph shall do.
 
-    controller: a key of CONTROLLERS. duration: s; None: as long as the trajectory takes.
+    controller: a key of CONTROLLERS. switches: to which others, and when; these run from the
+    start as well, and hold their state ready. duration: s; None: as long as the trajectory takes.
     params: ROS 2 parameter file, or None.
     """
 
@@ -41,22 +44,37 @@ class Plan:
     duration: float | None = None
     params: Path | None = None
     lockstep: bool = True
+    switches: tuple[Switch, ...] = ()
+
+    @property
+    def controllers(self) -> tuple[str, ...]:
+        """Return the names of the controllers that run, each once."""
+        return tuple(dict.fromkeys((self.controller, *(s.name for s in self.switches))))
 
     @property
     def nodes(self) -> tuple[str, ...]:
         """Return the names of the run's nodes, the plant last."""
-        return ("recorder_node", *CONTROLLERS[self.controller], "plant_node")
+        loops = dict.fromkeys(node for name in self.controllers for node in CONTROLLERS[name])
+        selector = ("selector_node",) if self.switches else ()
+        return ("recorder_node", *loops, *selector, "plant_node")
 
     @property
     def topics(self) -> tuple[str, ...]:
         """Return the names of the topics that these nodes publish, in the table's order."""
-        return tuple(t.name for t in TOPICS if not set(t.publishers).isdisjoint(self.nodes))
+        offered = () if self.switches else OFFERED_COMMANDS.values()
+        return tuple(
+            topic.name
+            for topic in TOPICS
+            if topic not in offered and not set(topic.publishers).isdisjoint(self.nodes)
+        )
 
 
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
-    if plan.controller not in CONTROLLERS:
-        raise ParameterError(f"controller {plan.controller!r}: there are {', '.join(CONTROLLERS)}")
+    for name in plan.controllers:
+        if name not in CONTROLLERS:
+            raise ParameterError(f"controller {name!r}: there are {', '.join(CONTROLLERS)}")
+    Selector(plan.controllers, _from_the_start(plan))
     if plan.bag.exists():
         raise ParameterError(f"{plan.bag}: exists already, and is not overwritten")
     if plan.duration is not None and not 0.0 < plan.duration < float("inf"):
@@ -118,7 +136,7 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
 
 
 def _run_parameters(plan: Plan) -> dict[str, Any]:
-    nodes = {
+    nodes: dict[str, dict[str, Any]] = {
         EVERY_NODE: {"lockstep": plan.lockstep},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
         "trajectory_node": {"trajectory": plan.trajectory},
@@ -126,18 +144,37 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
             "bag": str(plan.bag),
             "description": json.dumps(_description(plan)),
             "topics": list(plan.topics),
+            "nodes": [name for name in plan.nodes if name != "recorder_node"],
         },
     }
+    if plan.switches:
+        nodes["selector_node"] = _selector_parameters(plan)
+        nodes |= {f"{name}_node": {"standby": True} for name in plan.controllers}
     return {
         node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
         for node, values in nodes.items()
     }
 
 
+def _from_the_start(plan: Plan) -> list[Switch]:
+    return [Switch(0.0, plan.controller), *plan.switches]
+
+
+def _selector_parameters(plan: Plan) -> dict[str, Any]:
+    switches = _from_the_start(plan)
+    return {
+        "controllers": list(plan.controllers),
+        "switch_times": [switch.time for switch in switches],
+        "switch_to": [switch.name for switch in switches],
+    }
+
+
 def _description(plan: Plan) -> dict[str, str]:
     return {
         "software": f"emir {software_version()}",
-        "controller": plan.controller,
+        "controller": ", then ".join(
+            [plan.controller, *(f"{s.name} from {s.time:g} s" for s in plan.switches)]
+        ),
         "trajectory": plan.trajectory,
         "duration": f"{duration(plan):g} s",
         "time": "lockstep" if plan.lockstep else "realtime",

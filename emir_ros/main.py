@@ -63,6 +63,7 @@ def _run(node_class: Callable[[], Shell]) -> int:
         executor.add_node(node)
         while not (stop.made or node.done):
             executor.spin_once(timeout_sec=0.1)
+            node.check()
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
     except (ParameterError, NodeError, SimulationError) as error:

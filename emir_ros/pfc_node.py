@@ -16,7 +16,7 @@ class PfcNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("pfc_node", PfcControl.inputs, PfcControl.outputs, arguments)
-        self.law = PfcControl(Pfc(declare_pfc(self, STROKE)))
+        self.law = self.standing_by(PfcControl(Pfc(declare_pfc(self, STROKE))))
         self.state: Any = None
         reject_unknown(self)
 

@@ -17,7 +17,7 @@ class PfcTipNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("pfc_tip_node", PfcTipControl.inputs, PfcTipControl.outputs, arguments)
-        self.law = PfcTipControl(Tip(Pfc(declare_pfc(self, TIP_ANGLE))))
+        self.law = self.standing_by(PfcTipControl(Tip(Pfc(declare_pfc(self, TIP_ANGLE)))))
         self.state: Any = None
         reject_unknown(self)
 

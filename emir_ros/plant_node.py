@@ -30,6 +30,7 @@ from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros import qos
+from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
@@ -56,7 +57,7 @@ class PlantNodeParameters:
     )
     duration: float = quantity("s", 0.0, 1e6, "simulated time; 0: without end", default=0.0)
     command_timeout: float = quantity(
-        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.064
+        "s", 0.01, 10.0, "without a fresh command the valve shuts, real time", default=0.056
     )
     patience: float = quantity(
         "s", 0.1, 3600.0, "how long lock step waits for an answer", default=30.0
@@ -188,17 +189,17 @@ class PlantNode(Shell):
         if self._command is None:
             return 0.0
         if time.monotonic() - self._command_received > self.own.command_timeout:
-            self.get_logger().warning(
-                f"no fresh {VALVE_COMMAND.name}: valve shut", throttle_duration_sec=2.0
-            )
+            self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {VALVE_COMMAND.name}")
             return 0.0
         return self._command[1]
 
     def _on_command(self, message: Any) -> None:
         command = conversions.values(VALVE_COMMAND, message)["valve_command"]
         if not math.isfinite(command):
-            self.get_logger().error(f"{VALVE_COMMAND.name} is {command}: valve shut")
+            self.diagnostics.say(Level.ERROR, f"valve shut: {VALVE_COMMAND.name} is {command}")
             command = 0.0
+        else:
+            self.diagnostics.say(Level.OK, "running")
         self._command = (conversions.stamp_ns(message), command)
         self._command_received = time.monotonic()
         if self.lockstep:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import yaml
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -36,6 +37,20 @@ def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:
     profile = offered(lockstep=lockstep)
     if topic.quality == "sensor" and not lockstep:
         profile.reliability = ReliabilityPolicy.BEST_EFFORT
+    return profile
+
+
+def recorded(text: str) -> QoSProfile:
+    """Return the reliability and durability that a recording's channel says was offered.
+
+    text: `offered_qos_profiles` of the channel's metadata; what it does not say is as `offered`.
+    """
+    profile = offered(lockstep=False)
+    for entry in yaml.safe_load(text) or []:
+        if str(entry.get("durability")) in ("transient_local", "1"):  # by number before Jazzy
+            profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+        if str(entry.get("reliability")) in ("best_effort", "2"):
+            profile.reliability = ReliabilityPolicy.BEST_EFFORT
     return profile
 
 

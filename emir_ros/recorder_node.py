@@ -3,19 +3,29 @@
 Messages are stored as they came (CDR). In lock step they are stored in the order of stamps and
 of the topic table, with the stamp as time, so that two runs give the same recording; each
 finished control period is reported, and the plant waits for that, so that nothing is lost.
+What was recorded is handed to the operating system every second (of the run in lock step, of the
+clock otherwise), so a recorder that is killed outright loses no more than that.
 """
 
 import json
+import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from std_msgs.msg import Header
 
-from emir_analysis.rosbag2_writer import Rosbag2Writer, channel_metadata
+from emir_analysis.rosbag2_writer import (
+    COMPRESSIONS,
+    Rosbag2Writer,
+    WriteError,
+    channel_metadata,
+)
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
+from emir_msgs_py.meanings import field_table
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     PLANT_PERIOD_NS,
@@ -28,7 +38,12 @@ from emir_ros import qos
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
-from emir_ros.shell import Shell
+from emir_ros.parameter_record import ParameterRecord, as_metadata
+from emir_ros.shell import NodeError, Shell
+
+PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
+FLUSH_PERIOD_NS = conversions.NANOSECONDS
+MEGABYTE = 1_000_000
 
 CDR_STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
 
@@ -42,17 +57,41 @@ class RecorderNode(Shell):
         folder: str = declare(self, "bag", "", "folder of the recording, must not exist")
         names: list[str] = declare(self, "topics", everything, "topics to record")
         about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
+        nodes: list[str] = declare(self, "nodes", [""], "nodes whose parameters are recorded")
+        writer = self._make_writer(folder)
         reject_unknown(self)
-        if not folder:
-            raise ParameterError("recorder_node: bag: the folder of the recording is missing")
         self._topics = [_known(name) for name in names]
-        self._writer = Rosbag2Writer(Path(folder))
+        self._writer = writer()
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
+        self._failed = False
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
             self._record(topic)
+        self._described = not any(nodes)
+        if not self._described:
+            self._record_of_parameters = ParameterRecord(self, nodes, self._describe)
+        if not self.lockstep:
+            self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
+
+    def _make_writer(self, folder: str) -> Callable[[], Rosbag2Writer]:
+        """Declare what the file shall be like."""
+        kinds = ", ".join(COMPRESSIONS)
+        compression: str = declare(self, "compression", "none", f"of the file's chunks: {kinds}")
+        size: float = declare(self, "max_size", 0.0, "a new file from here on [MB]; 0: one file")
+        duration: float = declare(self, "max_duration", 0.0, "the same by time [s]; 0: one file")
+        for name, value in (("max_size", size), ("max_duration", duration)):
+            if not 0.0 <= value < math.inf:
+                raise ParameterError(f"recorder_node: {name} = {value:g}: has to be 0 or more")
+        if not folder:
+            raise ParameterError("recorder_node: bag: the folder of the recording is missing")
+        return lambda: Rosbag2Writer(
+            Path(folder),
+            compression,
+            max_size=size * MEGABYTE or math.inf,
+            max_duration=duration or math.inf,
+        )
 
     @property
     def writer(self) -> Rosbag2Writer:
@@ -61,15 +100,36 @@ class RecorderNode(Shell):
 
     def close(self) -> None:
         """Write what is left and finish the file."""
+        if self._failed:
+            return
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
-        self._writer.close()
+        with self._watched():
+            self._writer.close()
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Take a recording that cannot go on as the end of this node."""
+        try:
+            yield
+        except WriteError as error:
+            self._failed = True
+            raise NodeError(f"recorder_node: {error}") from None
+
+    def _write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
+        with self._watched():
+            self._writer.write(topic, data, log_time, publish_time)
+
+    def _flush(self) -> None:
+        with self._watched():
+            self._writer.flush()
 
     def _record(self, topic: Topic) -> None:
         full_name = self.resolve_topic_name(topic.name)
         profile = qos.offered(lockstep=self.lockstep)
-        offered = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
-        self._writer.add_topic(full_name, schema(topic.type), offered)
+        about = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
+        about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
+        self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive(data: bytes) -> None:
             sec, nanosec = CDR_STAMP.unpack_from(data)
@@ -77,15 +137,20 @@ class RecorderNode(Shell):
             if self.lockstep:
                 self._on_stamp(topic, stamp, data)
             else:
-                self._writer.write(full_name, data, self.get_clock().now().nanoseconds, stamp)
+                self._write(full_name, data, self.get_clock().now().nanoseconds, stamp)
 
         kind = conversions.message_class(topic.type)
         self.create_subscription(kind, topic.name, receive, profile, raw=True)
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data
-        while self._is_complete(self._next):
+        self._write_complete_stamps()
+
+    def _write_complete_stamps(self) -> None:
+        while self._described and self._is_complete(self._next):
             self._write_stamp(self._next)
+            if self._next % FLUSH_PERIOD_NS == 0:
+                self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._report(self._next)
             self._next += PLANT_PERIOD_NS
@@ -100,7 +165,13 @@ class RecorderNode(Shell):
         for topic in self._topics:
             if topic.name in messages:
                 full_name = self.resolve_topic_name(topic.name)
-                self._writer.write(full_name, messages[topic.name], stamp, stamp)
+                self._write(full_name, messages[topic.name], stamp, stamp)
+
+    def _describe(self, answers: dict[str, dict[str, Any]]) -> None:
+        """Store the parameters; in lock step nothing is written before, so as to be the same."""
+        self._writer.add_metadata(PARAMETERS, as_metadata(answers))
+        self._described = True
+        self._write_complete_stamps()
 
     def _report(self, stamp: int) -> None:
         message: Any = Header()

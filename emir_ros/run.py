@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from rclpy.executors import ExternalShutdownException
 
 from emir_analysis.errors import InputError
 from emir_analysis.run_report import analyze, text
+from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, Plan, check, ros_arguments
@@ -37,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         lockstep=not options.realtime,
     )
     try:
+        plan = replace(plan, switches=tuple(map(_switch, options.switch)))
         check(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
@@ -50,6 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
     parser.add_argument("--controller", default="cascade", help=", ".join(CONTROLLERS))
+    parser.add_argument(
+        "--switch", action="append", default=[], metavar="S=NAME",
+        help="to which controller at what time, while it moves; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--trajectory", default="lift-lower", help="lift-lower, lower-lift, hold")
     parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
@@ -59,6 +66,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--processes", choices=("one", "many"), default="one")
     parser.add_argument("--bag", type=Path, required=True, metavar="DIR", help="the recording")
     return parser
+
+
+def _switch(words: str) -> Switch:
+    time, equals, name = words.partition("=")
+    try:
+        return Switch(float(time), name.strip() if equals else "")
+    except ValueError:
+        raise ParameterError(f"--switch {words}: not of the form S=NAME") from None
 
 
 def _run(plan: Plan, processes: str) -> int:
@@ -92,6 +107,8 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             if stop.made:
                 raise KeyboardInterrupt
             executor.spin_once(timeout_sec=0.1)
+            for node in nodes.values():
+                node.check()
         _receive_the_rest(executor)
     finally:
         for node in nodes.values():

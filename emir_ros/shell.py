@@ -5,15 +5,28 @@ control period starts when all inputs with the stamp of that period are there, s
 runs as fast as it can and the result does not depend on how fast that is.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from emir_analysis.node_controls import NodeControl, Stepping
+from emir_analysis.switching import Ready
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    OFFERED_COMMANDS,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+    Topic,
+)
+from emir_plant.plant import SimulationError
 from emir_ros import qos
+from emir_ros.diagnostics import Diagnostics, Level
 from emir_ros.node_parameters import declare
 
 if TYPE_CHECKING:
@@ -35,12 +48,17 @@ class Shell(Node):
     def __init__(
         self, name: str, outputs: Sequence[Topic], arguments: Sequence[str] | None = None
     ) -> None:
+        self.failure: NodeError | SimulationError | None = None
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
-        self._outputs = {
-            topic.name: (topic, self._publisher(topic.type, topic.name)) for topic in outputs
-        }
+        self._outputs: dict[str, tuple[Topic, Any]] = {}
+        self._offer(outputs)
+        self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
+
+    def _offer(self, outputs: Sequence[Topic]) -> None:
+        for topic in outputs:
+            self._outputs[topic.name] = (topic, self._publisher(topic.type, topic.name))
 
     def _publisher(self, type_name: str, name: str) -> Any:
         kind = conversions.message_class(type_name)
@@ -51,6 +69,47 @@ class Shell(Node):
         publisher = self._outputs[topic.name][1]
         publisher.publish(conversions.message(topic, stamp, signals))
 
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
+    ) -> Any:
+        """Subscribe as rclpy does; a callback that fails ends the node (see `check`)."""
+
+        def call(message: Any) -> None:
+            self._keep_failure(callback, message)
+
+        return super().create_subscription(msg_type, topic, call, *args, **kw)
+
+    def create_timer(
+        self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **kw: Any
+    ) -> Any:
+        """Start a timer as rclpy does; a callback that fails ends the node (see `check`)."""
+
+        def call() -> None:
+            self._keep_failure(callback)
+
+        return super().create_timer(timer_period_sec, call, *args, **kw)
+
+    def _keep_failure(self, callback: Callable[..., None], *args: Any) -> None:
+        """Call back; keep a failure from the executor, which would print a traceback."""
+        try:
+            callback(*args)
+        except (NodeError, SimulationError) as error:
+            self.failure = self.failure or error
+
+    def check(self) -> None:
+        """Raise what a callback failed with, if one did: whoever spins the node calls this."""
+        if self.failure is not None:
+            raise self.failure
+
+    def start_timer(self, period: float, callback: Callable[[], None]) -> None:
+        """Call back every period, s: of /clock if the node uses it, else of a steady clock.
+
+        The computer's time of day may be set while a machine moves; a steady clock does not jump.
+        """
+        simulated = self.get_parameter("use_sim_time").value
+        clock = None if simulated else Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(period, callback, clock=clock)
+
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
 
@@ -58,8 +117,15 @@ class Shell(Node):
 class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
-    A subclass implements `control`; `stale` says what to do without fresh inputs.
+    A subclass implements `control`; `stale` says what to do without fresh inputs. timeout: s, by
+    default, after which an input is stale. A command that two nodes publish counts as missing:
+    nobody knows which of them to obey.
+
+    A node that commands the piston's velocity has the parameter `standby`: it then offers its
+    command to selector_node, which tells it what was applied, and holds its state ready.
     """
+
+    consequence = "no output"  # of missing inputs, in words
 
     def __init__(
         self,
@@ -67,18 +133,39 @@ class ControlNode(Shell):
         inputs: Sequence[Topic],
         outputs: Sequence[Topic],
         arguments: Sequence[str] | None = None,
+        timeout: float = 0.1,
     ) -> None:
-        super().__init__(name, outputs, arguments)
-        self._inputs = {topic.name: topic for topic in inputs}
-        self._timeout = Duration(
-            seconds=declare(self, "input_timeout", 0.1, "an older input is stale [s], real time")
-        )
+        super().__init__(name, [], arguments)
+        self._own = name.removesuffix("_node")
+        self._inputs: dict[str, Topic] = {}
+        about = "an older input is stale [s], real time"
+        self._timeout = Duration(seconds=declare(self, "input_timeout", timeout, about))
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
+        self._last_stamp = -1
         for topic in inputs:
-            self._subscribe(topic)
+            self.take(topic)
+        if self._own in OFFERED_COMMANDS:
+            about = "offer the command to selector_node and hold the state ready"
+            self._standby: bool = declare(self, "standby", False, about)
+            if self._standby:
+                outputs = [self._offered(topic) for topic in outputs]
+                self._hear_selector()
+        self._offer(outputs)
         if not self.lockstep:
-            self.create_timer(CONTROL_PERIOD_NS * 1e-9, self._on_timer)
+            self.start_timer(CONTROL_PERIOD_NS * 1e-9, self._on_timer)
+
+    def standing_by(self, control: NodeControl) -> Stepping:
+        """Return the controller as this node shall hold it: alone, or one of several."""
+        return Ready(self._own, control) if self._standby else control
+
+    def _offered(self, topic: Topic) -> Topic:
+        return OFFERED_COMMANDS[self._own] if topic is VELOCITY_COMMAND else topic
+
+    def _hear_selector(self) -> None:
+        """Take what was applied in the last period as an input; in the first there is none."""
+        self._pending[0] = {SELECTOR_TERMS.name: {}}
+        self.take(SELECTOR_TERMS, CONTROL_PERIOD_NS)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the output signals of one control period of dt, s."""
@@ -88,11 +175,18 @@ class ControlNode(Shell):
         """Return what to publish while inputs are missing or too old; None: nothing."""
         return None
 
-    def _subscribe(self, topic: Topic) -> None:
+    def needed(self) -> Collection[str]:
+        """Return the names of the inputs without which there is no period in real time."""
+        return self._inputs.keys() - {SELECTOR_TERMS.name}
+
+    def take(self, topic: Topic, later: int = 0) -> None:
+        """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
+        self._inputs[topic.name] = topic
+
         def receive(message: Any) -> None:
             signals = conversions.values(topic, message)
             if self.lockstep:
-                self._on_stamp(topic, conversions.stamp_ns(message), signals)
+                self._on_stamp(topic, conversions.stamp_ns(message) + later, signals)
             else:
                 self._latest[topic.name] = (self.get_clock().now(), signals)
 
@@ -104,31 +198,67 @@ class ControlNode(Shell):
         if stamp % CONTROL_PERIOD_NS:
             return
         complete = self._pending.setdefault(stamp, {})
+        if topic.name in complete or stamp <= self._last_stamp:
+            raise NodeError(
+                f"{self.get_name()}: {topic.name} came twice for t = {stamp * 1e-9:.3f} s:"
+                " does more than one node publish it?"
+            )
         complete[topic.name] = signals
         if len(complete) == len(self._inputs):
-            self._pending = {s: rest for s, rest in self._pending.items() if s > stamp}
+            del self._pending[stamp]
+            self._last_stamp = stamp
             self._run(stamp, complete.values())
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()
-        missing = [
-            name
-            for name in self._inputs
-            if name not in self._latest or now - self._latest[name][0] > self._timeout
-        ]
+        missing = self.missing()
         if not missing:
-            self._run(now.nanoseconds, [signals for _, signals in self._latest.values()])
-            return
-        self.get_logger().warning(
-            f"no fresh {', '.join(missing)}", throttle_duration_sec=2.0, skip_first=True
-        )
+            fresh = [s for t, s in self._latest.values() if self._is_fresh(t, now)]
+            self._run(now.nanoseconds, fresh)
+        else:
+            self.without(missing)
+
+    def missing(self) -> list[str]:
+        """Return what keeps a period from running, in words; nothing: all is there."""
+        now = self.get_clock().now()
+        found = []
+        for name in self.needed():
+            if name not in self._latest:
+                found.append(f"no {name} yet")
+            elif not self._is_fresh(self._latest[name][0], now):
+                found.append(f"no fresh {name}")
+            elif self._inputs[name].quality == "command" and self.count_publishers(name) > 1:
+                found.append(f"more than one node publishes {name}")
+        return found
+
+    def _is_fresh(self, heard: "Time", now: "Time") -> bool:
+        """Return whether an input is young enough; one from the future met a clock set back."""
+        return 0 <= now.nanoseconds - heard.nanoseconds <= self._timeout.nanoseconds
+
+    def without(self, missing: Sequence[str]) -> None:
+        """Do what is to be done in a period that cannot run, and say why."""
+        began = any(reason.endswith("yet") for reason in missing)
         instead = self.stale(missing)
+        what = f"{self.consequence}: " if instead is not None else ""
+        self.diagnostics.say(Level.WARN if began else Level.ERROR, what + ", ".join(missing))
         if instead is not None:
-            self._publish_all(now.nanoseconds, instead)
+            self._publish_all(self.get_clock().now().nanoseconds, instead)
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
         self._publish_all(stamp, self.control(signals, CONTROL_PERIOD_NS * 1e-9))
+        bad = [name for name, value in signals.items() if not math.isfinite(value)]
+        if bad:
+            verb = "is" if len(bad) == 1 else "are"
+            self.diagnostics.say(
+                Level.ERROR, f"{self.consequence}: {', '.join(bad)} {verb} not a number"
+            )
+        else:
+            self.diagnostics.say(Level.OK, self.status())
+
+    def status(self) -> str:
+        """Return what there is to say while all is well."""
+        return "running"
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
         for topic, _ in self._outputs.values():

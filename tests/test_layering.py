@@ -21,6 +21,7 @@ WITHOUT_ROS = sorted(MAY_IMPORT.keys() - {"emir_ros"})
 ROS_MODULES = [
     "ament_index_python",
     "builtin_interfaces",
+    "diagnostic_msgs",
     "geometry_msgs",
     "rcl_interfaces",
     "rclpy",

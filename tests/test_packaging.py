@@ -31,7 +31,11 @@ def test_ros_packages_that_are_used_are_dependencies() -> None:
     depended = {entry.text for entry in MANIFEST.getroot() if entry.tag.endswith("depend")}
     sources = "\n".join(path.read_text() for path in (CHECKOUT / "emir_ros").rglob("*.py"))
     used = set(re.findall(r"^ *(?:from|import) (\w+)", sources, re.MULTILINE))
-    used = {name for name in used if name in ROS_TOOLS or name.endswith(("_msgs", "_interfaces"))}
+    used = {
+        name
+        for name in used
+        if name in ROS_TOOLS or name.endswith(("_msgs", "_srvs", "_interfaces"))
+    }
     used |= {topic.type.split("/")[0] for topic in TOPICS}
     assert "rclpy" in used
     assert used <= depended

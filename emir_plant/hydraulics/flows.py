@@ -20,6 +20,16 @@ class Pressures(NamedTuple):
 
 
 @compiled
+def inlet_flow(wanted: float, drop: float, p: Any) -> float:
+    """Return what a drop, Pa, drives through pump line, metering edge and block, m^3/s.
+
+    wanted: flow, m^3/s, at which the edge alone drops `balance_pressure`; it stands for its size.
+    """
+    lines = p.k_pump_line + p.k_block_in
+    return turbulent_flow(drop, wanted / math.sqrt(lines * wanted * wanted + p.balance_pressure))
+
+
+@compiled
 def pump_flow(
     opening: float, nominal: float, supply: float, chamber_pressure: float, p: Any
 ) -> float:
@@ -30,10 +40,7 @@ def pump_flow(
     supply: pressure at the pump, Pa.
     """
     wanted = abs(opening) * nominal
-    lines = p.k_pump_line + p.k_block_in
-    conductance = wanted / math.sqrt(lines * wanted * wanted + p.balance_pressure)
-    available = turbulent_flow(supply - chamber_pressure, conductance)
-    return max(0.0, min(wanted, available))
+    return max(0.0, min(wanted, inlet_flow(wanted, supply - chamber_pressure, p)))
 
 
 @compiled
@@ -48,14 +55,22 @@ def lifting_flows(opening: float, pressures: Pressures, p: Any) -> tuple[float, 
 def lowering_flows(
     opening: float, pressures: Pressures, logic: float, p: Any
 ) -> tuple[float, float]:
-    """Return (Q_H, Q_S), m^3/s, for an opening < 0; logic is the block's opening y4 in [0, 1]."""
+    """Return (Q_H, Q_S), m^3/s, for an opening < 0; logic is the block's opening y4 in [0, 1].
+
+    The pressure balance stands in the inlet, or in the return, where it holds the flow out to
+    opening * Q_n as long as the load's pressure suffices; the inlet then is a plain edge.
+    """
     nominal = p.flow_nominal * p.flow_ratio_lowering
-    inflow = pump_flow(opening, nominal, pressures.supply, pressures.lowering, p)
+    supply = min(pressures.supply, p.limit_lowering)
     edge, block = opening * opening, logic * logic
     resistance = p.k_meter_out_lowering * block + p.k_return_line * edge * block
     resistance += p.k_block_out * edge
     conductance = abs(opening) * logic / math.sqrt(resistance)
-    return -turbulent_flow(pressures.lifting - p.pT, conductance), inflow
+    outflow = turbulent_flow(pressures.lifting - p.pT, conductance)
+    if p.balance_lowering == 0.0:
+        return -outflow, pump_flow(opening, nominal, supply, pressures.lowering, p)
+    inflow = inlet_flow(abs(opening) * nominal, supply - pressures.lowering, p)
+    return -min(outflow, abs(opening) * p.flow_nominal), max(0.0, inflow)
 
 
 @compiled

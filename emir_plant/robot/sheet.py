@@ -38,9 +38,11 @@ def _group(kind: Any, content: Any, prefix: str, given: dict[str, Any] | None = 
     hints, declared = get_type_hints(kind), quantities(kind)
     wanted = {field.name for field in dataclasses.fields(kind)} - values.keys()
     for name in content.keys() - wanted:
-        raise ParameterError(f"{prefix}{name}: there is no such parameter")
+        there = ", ".join(sorted(wanted))
+        raise ParameterError(f"{prefix}{name}: there is no such parameter; there are {there}")
     for name in sorted(wanted - content.keys()):
-        raise ParameterError(f"{prefix}{name}: missing")
+        allowed = f"; allowed is {declared[name].allowed}" if name in declared else ""
+        raise ParameterError(f"{prefix}{name}: missing{allowed}")
     for name in wanted:
         path = prefix + name
         if name not in declared:

@@ -1,6 +1,9 @@
 """The whole graph in real time, each node a process of its own.
 
 ros2 launch emir_ros emir.launch.py bag:=my_run controller:=cascade namespace:=arm
+
+With `standby:=pfc` a second controller holds its state ready, and selector_node, whose parameter
+`controller` may be set at any time, chooses.
 """
 
 from pathlib import Path
@@ -8,26 +11,33 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 PACKAGE = "emir_ros"
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the launch arguments and the five nodes."""
+    """Return the launch arguments and the nodes: five, or seven with a second controller."""
     parameters = Path(get_package_share_directory(PACKAGE)) / "config" / "emir.yaml"
-    controller = [LaunchConfiguration("controller"), "_node"]
+    controller, second = LaunchConfiguration("controller"), LaunchConfiguration("standby")
+    two = NotEqualsSubstitution(second, "")
+    if_two = IfCondition(two)
     return LaunchDescription(
         [
             _argument("bag", None, "folder of the recording; must not exist"),
             _argument("controller", "cascade", "outer controller: cascade, pfc, pfc_tip"),
+            _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
             _argument("params", str(parameters), "YAML file with the nodes' parameters"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
             _node("force_loop_node"),
-            _node(controller),
+            _node([controller, "_node"], {"standby": ParameterValue(two, value_type=bool)}),
+            _node([second, "_node"], {"standby": True}, if_two),
+            _node("selector_node", {"controller": controller}, if_two),
             _node("trajectory_node"),
         ]
     )
@@ -37,11 +47,16 @@ def _argument(name: str, default: str | None, description: str) -> DeclareLaunch
     return DeclareLaunchArgument(name, default_value=default, description=description)
 
 
-def _node(executable: str | list[object], parameters: dict[str, object] | None = None) -> Node:
+def _node(
+    executable: str | list[object],
+    parameters: dict[str, object] | None = None,
+    condition: IfCondition | None = None,
+) -> Node:
     return Node(
         package=PACKAGE,
         executable=executable,
         namespace=LaunchConfiguration("namespace"),
         parameters=[LaunchConfiguration("params"), parameters or {}],
+        condition=condition,
         output="screen",
     )

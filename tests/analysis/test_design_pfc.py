@@ -68,7 +68,7 @@ def test_design_model_answers_a_small_step_as_the_nonlinear_machine_does(
             sensed = ForceLoopInputs(
                 0.02 + step, 0.0, 0.0, shown.pressure_lifting, shown.pressure_lowering
             )
-            control = control or loop.initial(sensed)
+            control = control or loop.initial(sensed, 0.02)
             control, out = loop.step(control, sensed, PERIOD)
             state, shown = plant.step(state, out.valve_command, PERIOD)
         return np.array(found)

@@ -1,14 +1,17 @@
 """Figures of a run against signals whose figures are known."""
 
+import json
 import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from emir_analysis.cli import main
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import metrics
-from emir_analysis.run_report import analyze, text, write_json, write_report
+from emir_analysis.run_report import analyze, text, write_json
 from emir_analysis.run_signals import load_run
 from emir_analysis.signals import Recording, Signal
 
@@ -87,11 +90,31 @@ def test_an_old_recording_is_read_and_reported(tmp_path: Path) -> None:
     assert figures["tcp_deflection_static"] == pytest.approx(-0.18, abs=0.01)  # paper 3.2
     assert run.about["controller"] == "cascade"
     assert "tcp_deflection_static" in text(run)
-    write_json(run, tmp_path / "figures.json")
-    write_report(run, tmp_path / "report.html")
-    page = (tmp_path / "report.html").read_text()
-    assert page.count("<img") == 2
-    assert "tracking_error_peak" in page
+    write_json([run], tmp_path / "figures.json")
+    written = json.loads((tmp_path / "figures.json").read_text())["metrics"]
+    assert {name: entry["value"] for name, entry in written.items()} == figures
+
+
+def _earlier(folder: Path) -> Path:
+    """The same recording, cut off in the middle of the move."""
+    folder.mkdir()
+    content = next(LIFT.glob("*.mcap")).read_bytes()
+    (folder / "lift_0.mcap").write_bytes(content[: int(0.7 * len(content))])
+    return folder
+
+
+def test_several_recordings_make_one_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short, file = _earlier(tmp_path / "short"), tmp_path / "table.csv"
+    assert main(["analyze", str(LIFT), str(short), "--csv", str(file)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].split() == ["lift", "short"]
+    table = pd.read_csv(file, index_col="bag")
+    for bag in (LIFT, short):
+        for metric in analyze(bag).metrics:
+            assert table.loc[str(bag), f"{metric.name} [{metric.unit}]"] == metric.value
+    assert set(table["controller"]) == {"cascade"}
 
 
 def test_a_recording_of_something_else_is_refused(shared: Path) -> None:

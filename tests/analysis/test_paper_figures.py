@@ -13,18 +13,25 @@ from emir_analysis.cli import main
 from emir_analysis.figure_boom import PERIOD, REST_PRESSURE, STEP_SIZE, SWING, deflections
 from emir_analysis.figure_flow import stationary
 from emir_analysis.figure_steps import (
+    BALANCE_IN_INLET,
+    BLOCK_OPEN,
+    FULL_SUPPLY,
     LIFTING,
     LOWERING,
+    NARROW_RETURN,
+    SIZES,
+    STANDARD,
     StepResponses,
     slow_mode,
     step_responses,
 )
 from emir_analysis.paper_number import NO, NOT_MEASURED
 from emir_common.parameter_tree import with_values
+from emir_plant import linkage
 from emir_plant.core import Truth
 from emir_plant.linearize import linearize
 from emir_plant.plant import Plant
-from emir_plant.sheet import joint1
+from emir_plant.sheet import even_edges, joint1
 
 FORTY_FIVE = math.radians(45.0)
 MACHINE = joint1()
@@ -32,7 +39,7 @@ MACHINE = joint1()
 
 @pytest.fixture(scope="module")
 def steps() -> StepResponses:
-    return step_responses(MACHINE)
+    return step_responses(even_edges())
 
 
 def test_boom_at_rest_is_the_line_of_the_uniform_beam() -> None:
@@ -73,30 +80,85 @@ def test_no_flow_in_the_dead_zone_or_against_too_much_load() -> None:
     assert stationary(MACHINE, 2e6, 200e5, 1.0) == 0.0
 
 
+@pytest.mark.parametrize("drift", [0.0, -0.2])
 @pytest.mark.parametrize(("frequency", "damping"), [(0.7, 0.005), (0.5, 0.15), (0.9, 0.05)])
-def test_slow_mode_of_a_known_signal(frequency: float, damping: float) -> None:
-    time = np.arange(0.3, 5.0, 5e-3)
+def test_slow_mode_of_a_known_signal(frequency: float, damping: float, drift: float) -> None:
+    time = np.arange(0.0, 4.7, 5e-3)
     w = 2.0 * math.pi * frequency
-    swing = np.exp(-damping * w * time) * np.cos(w * math.sqrt(1.0 - damping**2) * time + 1.0)
+    phase = w * math.sqrt(1.0 - damping**2) * (time + 0.5 * drift * time**2 / time[-1])
+    swing = np.exp(-damping * w * time) * np.cos(phase + 1.0)
     bending = 0.1 * np.sin(2.0 * math.pi * 7.0 * time)
     found = slow_mode(time, 1.0 + 0.2 * time - 0.02 * time**2 + swing + bending)
-    assert found.frequency == pytest.approx(frequency, rel=0.01)
-    assert found.damping == pytest.approx(damping, abs=0.004)
+    assert found.frequency == pytest.approx(frequency, rel=0.02)
+    assert found.damping == pytest.approx(damping, abs=0.01)
 
 
 def test_smallest_step_swings_with_the_linear_models_mode(steps: StepResponses) -> None:
+    """The standard machine's edges are narrow: it swings as with the valve shut."""
     plant = Plant(MACHINE)
     frequency, _ = linearize(plant, plant.initial(FORTY_FIVE, REST_PRESSURE)).modes()
     for direction in (LIFTING, LOWERING):
-        mode = steps.of(45.0, direction)[0].mode
+        mode = steps.of(45.0, direction, STANDARD)[0].mode
         assert mode.frequency == pytest.approx(frequency[0], rel=0.03)
 
 
-def test_wide_return_edge_turns_the_trend_of_the_damping(steps: StepResponses) -> None:
-    """The paper's trend, 2.3: damping falls with the step; as the machine is, it grows."""
-    wide = [r.mode.damping for r in steps.wide if r.angle == 45.0]
-    assert np.all(np.diff(wide) < 0.0)
-    assert np.all(np.diff([r.mode.damping for r in steps.of(45.0, LIFTING)]) > 0.0)
+@pytest.mark.parametrize("direction", [LIFTING, LOWERING])
+def test_damping_falls_with_the_step_as_the_paper_says(
+    steps: StepResponses, direction: int
+) -> None:
+    responses = steps.of(45.0, direction)
+    fitted = np.array([r.mode.damping for r in responses])
+    assert np.all(np.diff(fitted) < 0.0)
+    assert fitted == pytest.approx([r.linear for r in responses], abs=0.003)
+
+
+def test_damping_by_hand(steps: StepResponses) -> None:
+    """The open chamber is a spring with a leak of time constant tau = V / (beta dQ/dp).
+
+    Its loss is k w tau / (1 + (w tau)^2), w that of the mode. Oil and boom are springs in series:
+    the oil has w^2 m / k of the energy, the boom the rest, damped by a hundredth.
+    """
+    machine, start = even_edges(), Plant(even_edges()).initial(FORTY_FIVE)
+    c, r, g = machine.cylinder, machine.resistances, machine.geometry
+    stroke = Plant(machine).outputs(start).stroke
+    arm = linkage.lever_arm(FORTY_FIVE, Plant(machine).record[0])
+    mass = g.boom_mass * g.boom_length**2 / 3.0 / arm**2
+    volume = c.volume_lowering_0 - c.area_lowering * stroke
+    leaking = c.beta * c.area_lowering**2 / volume
+    shut = c.beta * c.area_lifting**2 / (c.volume_lifting_0 + c.area_lifting * stroke)
+    for found in steps.of(45.0, LIFTING):
+        w = 2.0 * math.pi * found.mode.frequency
+        opening = (found.size - 0.1) / 0.9
+        flow = opening * machine.valve.flow_nominal * c.area_lowering / c.area_lifting
+        slope = 1.0 / (2.0 * (r.k_meter_out_lifting / opening**2 + r.k_return_line) * flow)
+        wt = w * volume / (c.beta * slope)
+        oil = shut + leaking * wt**2 / (1.0 + wt**2)
+        share = w**2 * mass / oil
+        by_hand = share * 0.5 * leaking / oil * wt / (1.0 + wt**2) + (1.0 - share) * 0.01
+        assert found.mode.damping == pytest.approx(by_hand, rel=0.1, abs=0.003)
+
+
+def test_other_edges_turn_the_trend_of_the_damping(steps: StepResponses) -> None:
+    for other in (NARROW_RETURN, BALANCE_IN_INLET):
+        damping = [r.mode.damping for r in steps.of(45.0, other.direction, other.name)]
+        assert np.all(np.diff(damping[1:]) > 0.0)
+        assert damping[-1] > 5.0 * steps.of(45.0, other.direction)[-1].mode.damping
+    for direction in (LIFTING, LOWERING):
+        damping = [r.mode.damping for r in steps.of(45.0, direction, STANDARD)]
+        assert np.all(np.diff(damping) > 0.0)
+
+
+def test_logic_block_interrupts_lowering_where_the_pressure_swings_low(
+    steps: StepResponses,
+) -> None:
+    closings = [r.interruptions for r in steps.of(45.0, LOWERING)]
+    threshold = even_edges().logic_block.threshold
+    assert [n > 0 for n in closings] == [r.lowest < threshold for r in steps.of(45.0, LOWERING)]
+    assert closings[-1] > 2
+    assert steps.of(45.0, LOWERING)[-1].least_flow < 0.8
+    for other in (BLOCK_OPEN, FULL_SUPPLY):
+        assert [r.interruptions for r in steps.of(45.0, LOWERING, other.name)] == [0] * len(SIZES)
+    assert steps.of(45.0, LOWERING, BLOCK_OPEN.name)[-1].least_flow > 0.99
 
 
 def test_table_follows_the_machine(steps: StepResponses, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """A recording in lock step replays bit for bit; what was not recorded so does not."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -8,16 +9,21 @@ from mcap.reader import make_reader
 from mcap.records import Schema
 
 from emir_analysis.cli import main
-from emir_analysis.replay import replay, same
+from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_analysis.stamped import same
+from emir_common.parameter_tree import declared
+from emir_plant.sheet import joint1
 
 OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"
 
 
-def _copy(folder: Path, about: dict[str, str]) -> Path:
+def _copy(folder: Path, about: dict[str, str], plant: dict[str, float] | None = None) -> Path:
     """The project's own recording with another description."""
     with next(OWN_BAG.glob("*.mcap")).open("rb") as stream, Rosbag2Writer(folder) as writer:
         writer.add_metadata("emir", about)
+        if plant is not None:
+            writer.add_metadata("emir.parameters", {"plant_node": json.dumps(plant)})
         for schema, channel, message in make_reader(stream).iter_messages():
             assert isinstance(schema, Schema)
             if channel.topic not in writer.topics:
@@ -42,7 +48,7 @@ def test_another_gain_answers_in_proportion(capsys: pytest.CaptureFixture[str]) 
     assert feedback.largest_difference > 1e-3
     assert fields["feedforward"].equal == fields["feedforward"].recorded.size
     assert main(["replay", str(OWN_BAG), "--node", "cascade", "--set", "gain=1.0"]) == 0
-    assert "open loop: the machine does not answer" in capsys.readouterr().out
+    assert "open loop: what it is fed stays as recorded" in capsys.readouterr().out
 
 
 def test_parameters_of_the_run_are_those_of_the_recording(tmp_path: Path) -> None:
@@ -52,6 +58,36 @@ def test_parameters_of_the_run_are_those_of_the_recording(tmp_path: Path) -> Non
     assert main(["replay", str(bag), "--node", "cascade"]) == 1
     assert main(["replay", str(bag), "--node", "force_loop"]) == 0
     assert same(replay(bag, "cascade", {"gain": 2.0}))
+
+
+def _machine() -> dict[str, float]:
+    """Its parameters as the graph records them: those of joint 1, and how it stood."""
+    values = {path: value for path, (_, value) in declared(joint1()).items()}
+    return values | {"initial_angle": math.pi / 4, "initial_pressure_lowering": 2e6}
+
+
+def test_the_machine_replays_bit_for_bit(tmp_path: Path) -> None:
+    bag = _copy(tmp_path / "bag", {}, _machine())
+    fields = replay(bag, "plant", {})
+    assert same(fields)
+    assert {len(field.recorded) for field in fields} == {401}  # 3.2 s / 8 ms and the first
+    assert main(["replay", str(bag), "--node", "plant"]) == 0
+
+
+def test_a_heavier_machine_needs_a_higher_pressure(tmp_path: Path) -> None:
+    bag = _copy(tmp_path / "bag", {}, _machine())
+    fields = {f.name: f for f in replay(bag, "plant", {"effects.payload.mass": 500.0})}
+    before, after = fields["pressure_lifting"].recorded, fields["pressure_lifting"].replayed
+    torque = 500.0 * 9.81 * 22.5 * math.cos(math.pi / 4)  # N m
+    force = torque / 0.63  # m, dh/dalpha at 45 deg
+    assert after[0] - before[0] == pytest.approx(force / (math.pi / 4 * 0.28**2), rel=0.03)
+
+
+def test_a_recording_without_the_machines_parameters_says_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["replay", str(OWN_BAG), "--node", "plant"]) == 1
+    assert "holds no parameters of plant_node" in capsys.readouterr().err
 
 
 BAD = {

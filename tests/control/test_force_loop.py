@@ -5,6 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.design_pfc import OperatingPoint, steady_motion
+from emir_common.parameter_tree import with_values
 from emir_control.force_loop import (
     ForceLoop,
     ForceLoopInputs,
@@ -16,6 +19,7 @@ from emir_control.prefilter import (
     piston_velocity,
     valve_command,
 )
+from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant import linkage
 from emir_plant.core import Truth
 from emir_plant.plant import Plant
@@ -62,9 +66,10 @@ def test_an_input_that_is_no_number_shuts_the_valve(index: int) -> None:
 
 
 def test_command_stays_within_the_valves_range() -> None:
-    state = LOOP.initial(_inputs(0.0))
     for velocity in (-10.0, 10.0):
-        _, outputs = LOOP.step(state, _inputs(0.0, velocity), DT)
+        state = LOOP.initial(_inputs(0.0))
+        for _ in range(10):  # the rate is limited as well
+            state, outputs = LOOP.step(state, _inputs(0.0, velocity), DT)
         assert outputs.valve_command == math.copysign(1.0, velocity)
         assert outputs.saturated
 
@@ -79,6 +84,43 @@ def test_prefilter_inverts_valve_and_cylinder(velocity: float) -> None:
     time, stroke = np.arange(len(run)) * 1e-2, run[:, Truth._fields.index("stroke")]
     half = len(run) // 2  # once the pressures have built up; swinging averages out
     assert np.polyfit(time[half:], stroke[half:], 1)[0] == pytest.approx(velocity, rel=0.06)
+
+
+def test_static_accuracy_does_not_depend_on_the_load() -> None:
+    """Paper 3.1: the high pass keeps the load out. Rest and steady speed, empty and loaded."""
+    trajectory = named("lift-lower", TrajectoryParameters(pause=4.0))
+    speeds, errors = [], []
+    for payload in (0.0, 1000.0):
+        plant = Plant(with_values(joint1(), {"geometry.payload": payload}))
+        found = ClosedLoop(plant, trajectory).run(math.radians(60.0), 2e6, 8.2)
+        errors.append(float(np.mean(found["true_stroke"][-100:])) - found["reference_stroke"][-1])
+        _, command = steady_motion(plant, OperatingPoint(payload=payload, velocity=0.02))
+        speeds.append((abs(command) - FILTER.dead_zone) / (1.0 - FILTER.dead_zone))
+    step = 2.0 * math.pi / 2**12 * 0.65  # m, of the resolver at the longest lever arm
+    assert np.abs(errors).max() < 2.0 * step
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.01)  # the pressure balance does its part
+
+
+@pytest.mark.parametrize("rate", [0.03, -0.03])
+def test_a_wanted_joint_rate_is_what_the_joint_does_in_any_posture(rate: float) -> None:
+    """Linkage ratio, dead zone and flow curve inverted together, on the machine.
+
+    Without feedback: with it, a weight that changes with the posture adds k_F T_H dF/dt.
+    """
+    static = ForceLoop(ForceLoopParameters(gain=0.0))
+    for degrees in (45.0, 70.0):
+        plant = Plant(joint1())
+        state = plant.initial(math.radians(degrees), 60e5)
+        shown, control, angles = plant.outputs(state), None, []
+        for _ in range(150):
+            sensed = ForceLoopInputs(
+                0.0, rate, shown.angle, shown.pressure_lifting, shown.pressure_lowering
+            )
+            control, out = static.step(control or static.initial(sensed), sensed, DT)
+            state, shown = plant.step(state, out.valve_command, DT)
+            angles.append(shown.angle)
+        late = np.array(angles[75:])
+        assert np.polyfit(DT * np.arange(late.size), late, 1)[0] == pytest.approx(rate, rel=0.1)
 
 
 def test_prefilter_leaves_the_dead_zone_at_once_and_rests_at_standstill() -> None:

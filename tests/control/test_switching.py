@@ -2,72 +2,120 @@
 
 import math
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
 import pytest
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.outer_loop import Situation
+from emir_analysis.node_controls import (
+    CascadeControl,
+    NodeControl,
+    PfcControl,
+    PfcTipControl,
+    Switchable,
+)
+from emir_analysis.switching import Ready, Selector, Switch, SwitchedLoop
+from emir_common.quantity import ParameterError
 from emir_control import pfc_file
-from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
-from emir_control.pfc import Pfc, PfcInputs
+from emir_control.cascade import Cascade, CascadeParameters
+from emir_control.pfc import Pfc
+from emir_control.pfc_file import STROKE, TIP_ANGLE
+from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
 SWITCH = 78  # control periods: 2.5 s, in the middle of the plateau
-LAW = Pfc(pfc_file.load(pfc_file.default_file("stroke"), "stroke"))
-CASCADE = Cascade(CascadeParameters())
+CONTROLS: dict[str, NodeControl] = {
+    "cascade": CascadeControl(Cascade(CascadeParameters())),
+    "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+    "pfc_tip": PfcTipControl(Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))),
+}
 
 
 @dataclass(frozen=True)
-class Switched:
-    """The cascade, then the predictive law; `how` it was prepared: followed, initialized, cold."""
+class Cold:
+    """A controller that begins anew when it is chosen: what `Ready` is there against."""
 
-    how: str
+    control: NodeControl
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
-        """Return state and command; see `OuterLoop`."""
-        wanted, reading = now.reference, now.reading
-        for_cascade = CascadeInputs(wanted, reading.stroke)
-        for_law = PfcInputs(wanted.stroke, wanted.velocity, now.preview, reading.stroke)
-        if state is None:
-            state = (0, CASCADE.initial(for_cascade), LAW.initial(for_law), 0.0)
-        k, cascading, predicting, command = state
-        if k < SWITCH:
-            cascading, out = CASCADE.step(cascading, for_cascade, dt)
-            command = out.velocity_command
-            predicting = LAW.follow(predicting, for_law, command)
-        else:
-            if k == SWITCH and self.how == "initialized":
-                predicting = LAW.initial(for_law, command)
-            elif k == SWITCH and self.how == "followed":
-                predicting = LAW.take_over(predicting, for_law)
-            elif k == SWITCH:
-                predicting = LAW.initial(for_law)
-            predicting, law_out = LAW.step(predicting, for_law, dt)
-            command = law_out.velocity_command
-        return (k + 1, cascading, predicting, command), {"velocity_command": command}
+    def step(self, state: Any, signals: dict[str, float], dt: float) -> tuple[Any, Any]:
+        """Return the next state and the outputs; see `NodeControl`."""
+        return self.control.step(state, signals, dt)
 
 
-def _run(how: str) -> dict[str, np.ndarray]:
+def _run(first: str, then: str, *, cold: bool = False) -> dict[str, np.ndarray]:
+    controls = {name: Cold(CONTROLS[name]) if cold else CONTROLS[name] for name in (first, then)}
+    loop = SwitchedLoop(controls, (Switch(0.0, first), Switch(SWITCH * 0.032, then)))
     trajectory = named("lift-lower", TrajectoryParameters())
-    return ClosedLoop(Plant(joint1()), trajectory, Switched(how)).run(math.pi / 4, 2e6, 9.0)
+    return ClosedLoop(Plant(joint1()), trajectory, loop).run(math.pi / 4, 2e6, 9.024)
 
 
-@pytest.mark.parametrize("how", ["followed", "initialized"])
-def test_switching_while_moving_is_bumpless(how: str) -> None:
-    """The command goes on without a jump; a controller that starts cold lets it fall to nothing."""
-    ready, cold = _run(how)["velocity_command"], _run("cold")["velocity_command"]
-    before = ready[SWITCH - 1]
-    assert before > 0.015  # it moves
-    assert ready[SWITCH] == pytest.approx(before, abs=1e-9)
-    assert np.abs(np.diff(ready[SWITCH - 1 : SWITCH + 10])).max() < 0.003
-    assert np.abs(np.diff(cold[SWITCH - 1 : SWITCH + 10])).max() > 0.015
-
-
-@pytest.mark.parametrize("how", ["followed", "initialized"])
-def test_after_switching_the_move_ends_where_it_should(how: str) -> None:
-    run = _run(how)
+@pytest.mark.parametrize(("first", "then"), list(permutations(CONTROLS, 2)))
+def test_switching_while_moving_is_bumpless(first: str, then: str) -> None:
+    """The command goes on as if nothing was switched; a cold start lets it jump."""
+    run, cold = _run(first, then), _run(first, then, cold=True)
+    command, jump = run["velocity_command"], abs(np.diff(run["velocity_command"]))
+    assert command[SWITCH - 1] > 0.015  # it moves
+    assert np.all(run[f"{first}_active"][:SWITCH] == 1.0)
+    assert np.all(run[f"{then}_active"][SWITCH:] == 1.0)
+    assert command[SWITCH] == pytest.approx(command[SWITCH - 1], abs=1e-9)
+    assert jump[SWITCH - 1 : SWITCH + 10].max() <= max(jump[30 : SWITCH - 1].max(), 0.003)
+    if then != "cascade":  # whose start is the place where the machine is
+        assert abs(np.diff(cold["velocity_command"]))[SWITCH - 1] > 0.015
     assert run["true_stroke"][-1] == pytest.approx(run["reference_stroke"][-1], abs=2e-3)
+
+
+def test_a_controller_that_was_never_switched_does_what_it_does_alone() -> None:
+    """Standing by does not change the one that drives, nor does being chosen from the start."""
+    from emir_analysis.outer_loop import PfcLoop
+
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = SwitchedLoop(CONTROLS, (Switch(0.0, "pfc"),))
+    alone = PfcLoop(CONTROLS["pfc"].pfc)  # type: ignore[attr-defined]
+    runs = [
+        ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, 4.8)
+        for outer in (loop, alone)
+    ]
+    assert np.array_equal(runs[0]["velocity_command"], runs[1]["velocity_command"])
+
+
+def test_one_that_follows_its_twin_offers_what_the_twin_commands() -> None:
+    """It sees all that the other does; taking over changes nothing then."""
+    twin = CONTROLS["pfc"]
+    assert isinstance(twin, Switchable)
+    ready = Ready("pfc", twin)
+    rng = np.random.default_rng(3)
+    state = driving = None
+    signals: dict[str, float] = {"stroke": 0.5, "reference_stroke": 0.5, "reference_velocity": 0.0}
+    signals |= {f"reference_stroke_{k}_ahead": 0.5 for k in range(1, 21)}
+    fed_back: dict[str, float] = {}
+    for _ in range(60):
+        now = signals | {"stroke": 0.5 + 1e-3 * rng.normal()}
+        driving, applied = twin.step(driving, now, 0.032)
+        state, _ = ready.step(state, now | fed_back, 0.032)
+        fed_back = {"applied_command": applied["velocity_command"], "pfc_active": 0.0}
+    assert state is not None
+    assert driving is not None
+    applied_command = fed_back["applied_command"]
+    followed = twin.follow(state.before, state.signals, applied_command, 0.032)
+    assert followed.model == pytest.approx(driving.model, abs=1e-12)
+    assert followed.errors == pytest.approx(driving.errors, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("controllers", "switches", "said"),
+    [
+        (("cascade", "magic"), ((0.0, "cascade"),), "controller 'magic': there are cascade, pfc"),
+        (("cascade",), ((0.0, "pfc"),), "controller 'pfc': running are cascade"),
+        (("cascade", "pfc"), ((1.0, "pfc"),), "have to rise from 0 s"),
+        (("cascade", "pfc"), ((0.0, "pfc"), (2.0, "cascade"), (2.0, "pfc")), "have to rise"),
+    ],
+)
+def test_a_plan_of_switching_that_cannot_be_is_refused(
+    controllers: tuple[str, ...], switches: tuple[tuple[float, str], ...], said: str
+) -> None:
+    with pytest.raises(ParameterError, match=said):
+        Selector(controllers, tuple(Switch(*switch) for switch in switches))

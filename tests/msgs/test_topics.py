@@ -5,6 +5,7 @@ from collections import Counter
 import pytest
 
 from emir_msgs_py import conversions
+from emir_msgs_py.meanings import field_table
 from emir_msgs_py.topics import TOPICS, TRUTH, Topic, by_name
 from emir_plant.core import Truth
 from emir_plant.sensors import Measurement
@@ -27,6 +28,13 @@ def test_truth_has_the_models_outputs_in_their_order() -> None:
 def test_every_measurement_is_published() -> None:
     plants = {s for t in TOPICS if t.publisher == "plant_node" for s in t.fields}
     assert set(Measurement._fields) <= plants
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=IDS)
+def test_every_field_has_a_meaning_of_its_own(topic: Topic) -> None:
+    meanings = [entry["meaning"] for entry in field_table(topic).values()]
+    assert all(meanings)
+    assert len(set(meanings)) == len(meanings)
 
 
 @pytest.mark.parametrize("topic", TOPICS, ids=IDS)

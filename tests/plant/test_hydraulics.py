@@ -13,7 +13,7 @@ from emir_plant.hydraulics import logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, flows, pump_flow
 from emir_plant.hydraulics.orifice import turbulent_flow
 from emir_plant.plant import Plant
-from emir_plant.sheet import joint1
+from emir_plant.sheet import even_edges, joint1
 
 PLANT = Plant(joint1())
 P = PLANT.record[0]
@@ -63,6 +63,28 @@ def test_return_flow_meets_the_series_of_resistances() -> None:
     resistance = P["k_meter_out_lowering"] / opening**2 + P["k_return_line"]
     resistance += P["k_block_out"] / logic**2
     assert resistance * flow**2 == pytest.approx(120 * BAR - P["pT"], rel=1e-3)
+
+
+def test_pressure_balance_in_the_return_lowers_any_load_alike() -> None:
+    p = Plant(even_edges()).record[0]
+    for opening in (-0.2, -0.6, -1.0):
+        out = [flows(opening, Pressures(p["p0"], load, BAR), 1.0, p)[0]
+               for load in np.array([20, 80, 300]) * BAR]  # fmt: skip
+        assert out == pytest.approx([opening * p["flow_nominal"]] * 3)
+    short = flows(-1.0, Pressures(p["p0"], 5 * BAR, BAR), 1.0, p)[0]
+    resistance = p["k_meter_out_lowering"] + p["k_return_line"] + p["k_block_out"]
+    assert resistance * short**2 == pytest.approx(5 * BAR - p["pT"], rel=0.1)  # laminar below 1 bar
+    assert short > -p["flow_nominal"]
+
+
+def test_lowering_chamber_is_fed_up_to_its_limit_and_never_drained_to_the_pump() -> None:
+    p = Plant(even_edges()).record[0]
+    inflow = [flows(-0.5, Pressures(p["p0"], 100 * BAR, at), 1.0, p)[1]
+              for at in (0.0, p["limit_lowering"], 50 * BAR)]  # fmt: skip
+    resistance = p["k_pump_line"] + p["k_block_in"]
+    resistance += p["balance_pressure"] / (0.5 * p["flow_nominal"]) ** 2
+    assert resistance * inflow[0] ** 2 == pytest.approx(p["limit_lowering"], rel=0.01)
+    assert inflow[1:] == [0.0, 0.0]
 
 
 def test_closed_logic_block_lets_nothing_out() -> None:

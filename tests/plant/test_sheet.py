@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from emir_common.parameter_tree import declared
+from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_plant.effects import Effects
 from emir_plant.hydraulics import chambers
 from emir_plant.plant import Plant
-from emir_plant.sheet import joint1, load_sheet
+from emir_plant.sheet import even_edges, joint1, load_sheet
 
 FILE = Path(__file__).parents[2] / "emir_plant" / "data" / "joint1.yaml"
 
@@ -32,7 +32,16 @@ def test_every_number_of_the_machine_has_a_source() -> None:
             "beta: {value: 5.0e+3, unit: bar",
             "in bar, expected Pa",
         ),
-        ("  beta:", "  betta:", "cylinder.betta: there is no such parameter"),
+        (
+            "  beta:",
+            "  betta:",
+            "cylinder.betta: there is no such parameter; there are area_lifting, area_lowering,",
+        ),
+        (
+            "cylinder:",
+            "colour: red\ncylinder:",
+            "colour: there is no such parameter; there are geo",
+        ),
         ("cylinder:", "cylinder: [", "not YAML"),
     ],
 )
@@ -53,10 +62,52 @@ def test_a_missing_parameter_is_named(tmp_path: Path) -> None:
     bad = tmp_path / "machine.yaml"
     lines = [line for line in FILE.read_text().splitlines() if "threshold" not in line]
     bad.write_text("\n".join(lines))
-    with pytest.raises(ParameterError, match=r"logic_block.threshold: missing"):
+    with pytest.raises(ParameterError, match=r"threshold: missing; allowed is 0 \.\.\. 5e\+07 Pa$"):
         load_sheet(bad)
     with pytest.raises(ParameterError, match="No such file"):
         load_sheet(tmp_path / "none.yaml")
+
+
+def test_a_file_may_state_only_what_differs_from_another(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text(FILE.read_text())
+    own = tmp_path / "own.yaml"
+    own.write_text(
+        "based_on: base.yaml\nsupply: {p0: {value: 3.0e+7, unit: Pa}}\ngeometry: {payload: 100}\n"
+        "effects: {viscous_friction: {coefficient: 2.0e+4}}\n"
+    )
+    changes = {
+        "supply.p0": 3e7,
+        "geometry.payload": 100.0,
+        "effects.viscous_friction.coefficient": 2e4,
+    }
+    assert load_sheet(own, strict=True).machine == with_values(joint1(), changes)
+    own.write_text("based_on: nowhere.yaml\n")
+    with pytest.raises(ParameterError, match=r"nowhere.yaml: No such file"):
+        load_sheet(own)
+    (tmp_path / "base.yaml").write_text("based_on: own.yaml\n")
+    own.write_text("based_on: base.yaml\n")
+    with pytest.raises(ParameterError, match="is itself based on another"):
+        load_sheet(own)
+
+
+def test_the_other_reading_of_the_valve_changes_what_it_says_and_no_more() -> None:
+    sheet = load_sheet(FILE.parent / "joint1_even_edges.yaml", strict=True)
+    values = {path: value for path, (_, value) in declared(even_edges()).items()}
+    standard = {path: value for path, (_, value) in declared(joint1()).items()}
+    changed = {path for path in values if values[path] != standard[path]}
+    assert changed == {
+        "cylinder.beta",
+        "logic_block.threshold",
+        "resistances.k_meter_out_lifting",
+        "resistances.k_meter_out_lowering",
+        "valve.balance_lowering",
+        "valve.flow_ratio_lowering",
+        "valve.limit_lowering",
+    }
+    assert changed <= sheet.sources.keys()
+    edge = values["valve.balance_pressure"] / values["valve.flow_nominal"] ** 2
+    assert values["resistances.k_meter_out_lifting"] == pytest.approx(edge)
+    assert values["resistances.k_meter_out_lowering"] == pytest.approx(edge)
 
 
 def test_the_data_sheet_is_read_with_its_tolerances(shared: Path) -> None:

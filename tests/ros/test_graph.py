@@ -1,5 +1,6 @@
 """The graph against the plain loop, its recordings against other readers, and dying nodes."""
 
+import json
 import math
 import os
 import re
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from mcap.reader import make_reader
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
@@ -21,11 +23,16 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.info import info, parameters_text
+from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
 from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
-from emir_analysis.replay import replay, same
+from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_analysis.stamped import same
+from emir_analysis.switching import Switch, SwitchedLoop
 from emir_control import pfc_file
+from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
@@ -34,13 +41,16 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TOPICS, by_name
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
-from emir_ros.graph import Plan, duration, ros_arguments
+from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.run import main as run_graph
 
 DURATION = 4.8  # s: at rest, and into the plateau of the first move
 
 
 CASCADE_TOPICS = {f"/{name}" for name in Plan(bag=Path()).topics}
+
+
+NODES = set(Plan(bag=Path()).nodes) - {"recorder_node"}
 
 
 def _loop_signals(controller: str) -> dict[str, np.ndarray]:
@@ -95,7 +105,40 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert finished.returncode == 0, finished.stderr
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
-    for node in ("trajectory", controller, "force_loop"):
+    for node in ("trajectory", controller, "force_loop", "plant"):
+        assert same(replay(bag, node, {})), node
+
+
+def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path) -> None:
+    files = []
+    for name in ("first", "second"):
+        bag = tmp_path / name / "run"
+        words = ["--controller", "cascade", "--switch", "2.5=pfc", "--switch", "3.6=pfc_tip"]
+        assert run_graph([*words, "--duration", str(DURATION), "--bag", str(bag)]) == 0
+        files.append((bag / "run_0.mcap").read_bytes())
+    assert files[0] == files[1]
+    controls = {
+        "cascade": CascadeControl(Cascade(CascadeParameters())),
+        "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+        "pfc_tip": PfcTipControl(
+            Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
+        ),
+    }
+    switches = (Switch(0.0, "cascade"), Switch(2.5, "pfc"), Switch(3.6, "pfc_tip"))
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
+    expected = loop.run(math.pi / 4, 2e6, DURATION)
+    recorded = _read_with_rosbags(bag)
+    plan = Plan(bag=bag, controller="cascade", switches=switches[1:])
+    assert recorded.keys() == {f"/{name}" for name in plan.topics}
+    for topic in map(by_name, plan.topics):
+        for name in topic.fields:
+            values = [
+                conversions.values(topic, message)[name]
+                for _, message in recorded[f"/{topic.name}"]
+            ]
+            assert np.array_equal(values, expected[name]), name
+    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop"):
         assert same(replay(bag, node, {})), node
 
 
@@ -109,7 +152,6 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
 
 
 def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
-    from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
     bag = tmp_path / "run"
@@ -132,6 +174,7 @@ def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
             assert {"offered_qos_profiles", "topic_type_hash"} <= channel.metadata.keys()
         stored = {record.name: record.metadata for record in reader.iter_metadata()}
     assert counts == {topic: len(messages) for topic, messages in by_rosbags.items()}
+    assert set(stored["emir.parameters"]) == NODES
     text = (bag / "metadata.yaml").read_text()
     assert stored["rosbag2"]["serialized_metadata"] == text
     assert not re.search(r"[&*]id\d", text)  # rosbag2 writes no anchors
@@ -218,6 +261,9 @@ BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
+    "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
+    "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),
+    "switch order": (["--switch", "2=pfc", "--switch", "1=cascade"], "", "have to rise from 0 s"),
     "range": (
         [],
         "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}",
@@ -280,6 +326,34 @@ def test_a_recording_is_never_overwritten(
     with pytest.raises(ValueError, match="exists already"):
         Rosbag2Writer(tmp_path)
     assert (tmp_path / "precious").read_text() == "data"
+
+
+@pytest.mark.parametrize("processes", ["one", "many"])
+def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) -> None:
+    """Parameters as set and as left alone, and what every field means."""
+    file, bag = tmp_path / "params.yaml", tmp_path / "run"
+    file.write_text("cascade_node: {ros__parameters: {gain: 1.5}}\n")
+    words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    with (bag / "run_0.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        stored = {record.name: record.metadata for record in reader.iter_metadata()}
+        summary = reader.get_summary()
+    assert summary is not None
+    parameters = {node: json.loads(text) for node, text in stored["emir.parameters"].items()}
+    assert parameters["cascade_node"]["gain"] == 1.5
+    assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
+    assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
+    for channel in summary.channels.values():
+        topic = by_name(channel.topic[1:])
+        fields = json.loads(channel.metadata["fields"])
+        assert {name: entry["unit"] for name, entry in fields.items()} == {
+            name: field.unit for name, field in topic.fields.items()
+        }
+        assert all(entry["meaning"] for entry in fields.values())
+    again = tmp_path / "again.yaml"
+    again.write_text(parameters_text(info(bag)))
+    assert read_parameters(again) == parameters  # the file sets up the same run
 
 
 def test_parameters_reach_the_nodes(tmp_path: Path) -> None:

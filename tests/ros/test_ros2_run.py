@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from emir_msgs_py.topics import TOPICS, VALVE_COMMAND
+from emir_msgs_py.topics import OFFERED_COMMANDS, TOPICS, VALVE_COMMAND
 
 rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
@@ -25,11 +25,13 @@ NODES = (
     "pfc_tip_node",
     "plant_node",
     "recorder_node",
+    "selector_node",
     "trajectory_node",
 )
 DEADLINE = 120.0  # s; the machine's first start compiles it
 
-PUBLISHED = {name: {t.name for t in TOPICS if name in t.publishers} for name in NODES}
+OFFERED = {topic.name for topic in OFFERED_COMMANDS.values()}  # by one of several controllers
+PUBLISHED = {name: {t.name for t in TOPICS if name in t.publishers} - OFFERED for name in NODES}
 SUBSCRIBED = {"plant_node": {VALVE_COMMAND.name}, "recorder_node": {t.name for t in TOPICS}}
 
 

@@ -144,7 +144,7 @@ def _loops(model: pin.Model) -> tuple[pin.StdVec_RigidConstraintModel, object]:
 def test_mass_and_bias_are_mujocos() -> None:
     """The chain without linkage parts, written for another rigid-body library."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is missing: pip install mujoco")
-    from emir_analysis.robot_bench import massless_parts, mjcf
+    from emir_analysis.bench.robot import massless_parts, mjcf
 
     machine = massless_parts(ROBOT)
     model = mujoco.MjModel.from_xml_string(mjcf(machine, 1e-3))

@@ -1,18 +1,16 @@
-"""How fast the whole robot runs, beside MuJoCo and Pinocchio stepping the same chain.
+"""Speed of the whole robot, beside MuJoCo and Pinocchio stepping the same chain.
 
-    OMP_NUM_THREADS=1 python -m emir_analysis.robot_bench
-
-prints simulated seconds per second on one core. The chain of the comparison is the 96 freedoms
-without linkage parts and oil: MuJoCo and plain Pinocchio have neither.
+The chain of the comparison is the 96 freedoms without linkage parts and oil: MuJoCo and plain
+Pinocchio have neither.
 """
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from emir_analysis.bench.timing import Contender, Figure, rates
 from emir_common.parameter_tree import with_values
 from emir_plant.robot.dynamics import Mechanics
 from emir_plant.robot.parameters import Robot
@@ -25,19 +23,8 @@ POSTURE = np.radians([0.0, 45.0, -17.0, 11.0, -11.0, 17.0])
 COMMANDS = np.array([0.3, 0.5, -0.3, 0.4, 0.3, -0.3])
 X, Y, Z = "1 0 0", "0 1 0", "0 0 1"
 CUT_AXES = (*(("slide", axis) for axis in (X, Y, Z)), *(("hinge", axis) for axis in (Z, Y, X)))
+LAP = 0.064  # s, of the robot in one timed run
 EXPLICIT_STEP = 7e-5  # s, about the largest at which Runge-Kutta is stable on the cuts' dampers
-
-
-def _rate(step: Callable[[], object], dt: float, seconds: float = 1.0) -> float:
-    """Return simulated seconds per second of a step of dt, s: the best of several runs."""
-    step()
-    best, until = 0.0, time.perf_counter() + seconds
-    while time.perf_counter() < until:
-        begin = time.perf_counter()
-        for _ in range(50):
-            step()
-        best = max(best, 50 * dt / (time.perf_counter() - begin))
-    return best
 
 
 def massless_parts(machine: Robot) -> Robot:
@@ -48,60 +35,65 @@ def massless_parts(machine: Robot) -> Robot:
     )
 
 
-def robot_rates() -> Iterator[tuple[str, float]]:
-    """Yield what is measured and its rate: the whole robot with oil, all joints moving."""
-    plant = RobotPlant(robot())
-    start = plant.initial(POSTURE, 20e5)
-    for milliseconds in (1, 4, 8, 32):
-        dt = milliseconds * 1e-3
-        yield (
-            f"robot, {milliseconds} ms at a time, outputs included",
-            _rate(_stepping(plant, start, dt), dt),
-        )
-
-
-def _stepping(plant: RobotPlant, start: Any, dt: float) -> Callable[[], None]:
-    state = start
-
-    def step() -> None:
-        nonlocal state
-        state, _ = plant.step(state, COMMANDS, dt)
-
-    return step
-
-
-def pinocchio_rate() -> float:
-    """Return the rate of classical Runge-Kutta on Pinocchio's forward dynamics (ABA)."""
+def robot_figures(seconds: float) -> Iterator[tuple[str, list[Figure]]]:
+    """Yield title and figures of the robot; seconds: about what each contender gets."""
     mechanics = Mechanics(massless_parts(robot()))
+    found = [_robot(milliseconds * 1e-3) for milliseconds in (1, 2, 4, 8, 32)]
+    found.append(_pinocchio(mechanics))
+    mujoco = _mujoco(mechanics, 1e-3)
+    figures = rates([*found, *([] if mujoco is None else [mujoco])], "s/s", seconds)
+    if mujoco is None:
+        figures.append(Figure("chain, MuJoCo", None, "s/s", note="MuJoCo is not installed"))
+    yield "Robot, 96 freedoms, one core", figures
+
+
+def _robot(dt: float) -> Contender:
+    """Return the whole robot with oil, all joints moving, dt, s, at a time."""
+    plant = RobotPlant(robot())
+    state = start = plant.initial(POSTURE, 20e5)
+    steps = round(LAP / dt)
+
+    def run() -> None:
+        nonlocal state
+        state = start
+        for _ in range(steps):
+            state, _ = plant.step(state, COMMANDS, dt)
+
+    return Contender(f"robot with oil, {dt * 1e3:g} ms at a time, outputs included", run, LAP)
+
+
+def _pinocchio(mechanics: Mechanics) -> Contender:
+    """Return classical Runge-Kutta on Pinocchio's forward dynamics (ABA)."""
     t = mechanics.topology
     data = t.model.createData()
     z, rate, _, _ = mechanics.expand(rest(mechanics, POSTURE).coordinates, np.zeros(96))
     load = np.zeros(t.model.nv)
 
-    def stage() -> None:
-        pin.aba(t.model, data, z, rate, load)
+    def run() -> None:
+        for _ in range(4 * 10):
+            pin.aba(t.model, data, z, rate, load)
 
-    return _rate(stage, EXPLICIT_STEP) / 4.0
+    note = f"steps of {EXPLICIT_STEP * 1e3:g} ms, or its dampers diverge"
+    return Contender("chain, Pinocchio ABA, Runge-Kutta 4", run, 10 * EXPLICIT_STEP, note)
 
 
-def mujoco_rate(dt: float) -> float | None:
-    """Return MuJoCo's rate at steps of dt, s, implicit integrator; None where it is missing."""
+def _mujoco(mechanics: Mechanics, dt: float) -> Contender | None:
+    """Return MuJoCo at steps of dt, s, implicit integrator; None where it is missing."""
     try:
         import mujoco  # noqa: PLC0415 (only wanted here)
     except ModuleNotFoundError:
         return None
-    machine = massless_parts(robot())
-    model = mujoco.MjModel.from_xml_string(mjcf(machine, dt))
+    model = mujoco.MjModel.from_xml_string(mjcf(mechanics.robot, dt))
     data = mujoco.MjData(model)
-    mechanics = Mechanics(machine)
     held = rest(mechanics, POSTURE)
     data.qpos[:] = held.coordinates
     data.qfrc_applied[mechanics.topology.joints] = held.torques
 
-    def step() -> None:
-        mujoco.mj_step(model, data)
+    def run() -> None:
+        for _ in range(10):
+            mujoco.mj_step(model, data)
 
-    return _rate(step, dt)
+    return Contender(f"chain, MuJoCo implicitfast at {dt * 1e3:g} ms", run, 10 * dt)
 
 
 def mjcf(machine: Robot, dt: float) -> str:
@@ -141,17 +133,3 @@ def _inertial(inertia: Any) -> str:
 
 def _text(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
-
-
-def main() -> None:
-    """Print the rates as they are measured."""
-    for name, rate in robot_rates():
-        print(f"{name:60s} {rate:8.1f}")
-    print(f"{'chain, Pinocchio ABA, Runge-Kutta at 0.07 ms':60s} {pinocchio_rate():8.1f}")
-    found = mujoco_rate(1e-3)
-    shown = "not installed" if found is None else f"{found:8.1f}"
-    print(f"{'chain, MuJoCo implicitfast at 1 ms':60s} {shown}")
-
-
-if __name__ == "__main__":
-    main()

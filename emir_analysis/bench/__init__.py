@@ -1,0 +1,1 @@
+"""`emir bench`: how fast the parts are, beside other programs doing the same in the same run."""

@@ -1,0 +1,221 @@
+"""`emir import`: a table of measurements becomes a recording, by a signal map.
+
+The map is the one that `emir diagnose` reads, with the column of each signal and the time:
+
+    time: {column: t, unit: s}          # or {period: 0.01, unit: s}
+    oil_pressure: {column: p, column_unit: bar, topic: /rig/pressure, field: fluid_pressure,
+                   unit: Pa}
+
+Without a time the rows are samples; a sample stands in the recording as one second.
+"""
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.records import Schema
+from mcap_ros2._dynamic import serialize_dynamic
+
+from emir_analysis.csv_table import read_columns
+from emir_analysis.errors import InputError
+from emir_analysis.info import FIELDS
+from emir_analysis.rosbag2_writer import Rosbag2Writer, channel_metadata
+from emir_analysis.signals import TIME, Array, Source, read_signal_map
+from emir_common.yaml_file import read_map
+from emir_msgs_py.definitions import DEFINITIONS, FLOAT64, HASHES
+from emir_msgs_py.topics import FLUID_PRESSURE, JOINT_STATE
+
+METADATA = "emir.import"  # the record that says where a recording came from
+LAST_STAMP = 2**31  # s, of a ROS stamp
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "sample": 1.0}
+UNITS = {  # a column's unit -> SI unit, factor
+    "bar": ("Pa", 1e5), "mbar": ("Pa", 100.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6),
+    "psi": ("Pa", 6894.757293168), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "kN": ("N", 1e3),
+    "deg": ("rad", math.pi / 180.0), "mrad": ("rad", 1e-3), "mm/s": ("m/s", 1e-3),
+    "deg/s": ("rad/s", math.pi / 180.0), "l/min": ("m^3/s", 1e-3 / 60.0), "%": ("1", 0.01),
+}  # fmt: skip
+ARRAYS = ("position", "velocity", "effort")  # of a JointState
+_FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_SYSTEM_DEFAULT = [
+    {"history": 3, "depth": 0, "reliability": 1, "durability": 2,
+     "deadline": {"sec": 9223372036, "nsec": 854775807},
+     "lifespan": {"sec": 9223372036, "nsec": 854775807},
+     "liveliness": 1, "liveliness_lease_duration": {"sec": 9223372036, "nsec": 854775807},
+     "avoid_ros_namespace_conventions": False}
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a signal comes from and where it goes. factor: from the column's unit to the map's."""
+
+    name: str
+    source: Source
+    factor: float
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was written: rows, the time of the first and of the last, in s or samples."""
+
+    rows: int
+    start: float
+    end: float
+    unit: str
+
+
+def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None) -> Imported:
+    """Write the mapped columns of a CSV file as a rosbag2 recording in the folder `out`.
+
+    rows: which of the table's rows; all when not given. Raises InputError or ParameterError,
+    one line each, for a map or a table that cannot be used and for a folder that exists.
+    """
+    columns = _columns(signals)
+    clock = _clock(signals)
+    wanted = [column.name for column in columns.values()]
+    if clock.column is not None:
+        wanted.append(clock.column)
+    read = read_columns(table, dict.fromkeys(wanted))
+    count = next(iter(read.values())).size
+    chosen = np.arange(count)[rows or slice(None)]
+    if chosen.size == 0:
+        raise InputError(f"{table}: none of its {count} rows is among those asked for")
+    time = _time(table, clock, read, count)[chosen]
+    values = {name: column.factor * read[column.name][chosen] for name, column in columns.items()}
+    sources = {name: column.source for name, column in columns.items()}
+    origin = {name: f"column {column.name}" for name, column in columns.items()}
+    write_signals(out, time, values, sources, origin | {
+        "file": table.name,
+        "time": "a sample stands as one second" if clock.unit == "sample" else "s",
+    })  # fmt: skip
+    unit = "samples" if clock.unit == "sample" else "s"
+    return Imported(chosen.size, float(time[0]), float(time[-1]), unit)
+
+
+def write_signals(
+    out: Path,
+    time: Array,
+    values: dict[str, Array],
+    sources: dict[str, Source],
+    about: dict[str, str],
+) -> None:
+    """Write signals that share their times (n,), s, as a recording of standard messages.
+
+    values: (n,) by name. sources: topic and field of each. about: stored as metadata; what it
+    says of a signal's name is stored with the field, too. Raises
+    InputError for a field that no supported message has, ParameterError for an existing folder.
+    """
+    stamps = np.round(time * 1e9).astype(np.int64)
+    topics = {source.topic for source in sources.values()}
+    members = {t: {n: s for n, s in sources.items() if s.topic == t} for t in sorted(topics)}
+    kinds = {topic: _message_type(topic, signals) for topic, signals in members.items()}
+    encoders = {k: serialize_dynamic(k, DEFINITIONS[k])[k] for k in set(kinds.values())}
+    with Rosbag2Writer(out) as writer:
+        writer.add_metadata(METADATA, about)
+        for topic, signals in members.items():
+            kind = kinds[topic]
+            schema = Schema(0, DEFINITIONS[kind].encode(), "ros2msg", kind)
+            fields = {
+                n: {"path": s.field, "unit": s.unit, "meaning": about.get(n, "")}
+                for n, s in signals.items()
+            }
+            metadata = channel_metadata(_SYSTEM_DEFAULT, HASHES[kind])
+            writer.add_topic(topic, schema, metadata | {FIELDS: json.dumps(fields)})
+        for k, stamp in enumerate(stamps.tolist()):
+            for topic, signals in members.items():
+                now = {signals[name].field: float(values[name][k]) for name in signals}
+                message = _message(kinds[topic], stamp, list(signals), now)
+                writer.write(topic, encoders[kinds[topic]](message), stamp, stamp)
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """column: with the time, or None where rows follow each other in a fixed period, s."""
+
+    column: str | None
+    period: float
+    unit: str
+
+
+def _clock(file: Path) -> _Clock:
+    entry = read_map(file, what="signals").get(TIME, {"unit": "sample"})
+    if not isinstance(entry, dict):
+        raise InputError(f"{file}: {TIME}: needs column or period, and unit")
+    unit = str(entry.get("unit", "s"))
+    if unit not in TIME_UNITS:
+        raise InputError(f"{file}: {TIME} in {unit}; known are {', '.join(TIME_UNITS)}")
+    if "column" in entry:
+        return _Clock(str(entry["column"]), TIME_UNITS[unit], unit)
+    period = entry.get("period", 1.0 if unit == "sample" else None)
+    if not isinstance(period, int | float) or not 0.0 < period < math.inf:
+        raise InputError(f"{file}: {TIME}: needs the column of the times or the period of the rows")
+    return _Clock(None, period * TIME_UNITS[unit], unit)
+
+
+def _columns(file: Path) -> dict[str, Column]:
+    entries = read_map(file, what="signals")
+    found = {}
+    for name, source in read_signal_map(file).items():
+        entry = entries[name]
+        if "column" not in entry:
+            raise InputError(f"{file}: {name}: needs the column of the table")
+        unit = str(entry.get("column_unit", source.unit))
+        si, factor = UNITS.get(unit, (unit, 1.0)) if unit != source.unit else (unit, 1.0)
+        if si != source.unit:
+            raise InputError(f"{file}: {name}: a column in {unit} is no signal in {source.unit}")
+        found[name] = Column(str(entry["column"]), source, factor)
+    return found
+
+
+def _time(table: Path, clock: _Clock, read: dict[str, Array], count: int) -> Array:
+    if clock.column is None:
+        return clock.period * np.arange(count, dtype=np.float64)
+    time = clock.period * read[clock.column]
+    behind = np.flatnonzero(np.diff(time) <= 0.0)
+    if behind.size:
+        raise InputError(f"{table}: {clock.column} does not increase at row {behind[0] + 1}")
+    if time[0] < 0.0 or time[-1] >= LAST_STAMP:
+        raise InputError(f"{table}: {clock.column}: a stamp holds 0 ... {LAST_STAMP} s")
+    return np.asarray(time)
+
+
+def _message_type(topic: str, signals: dict[str, Source]) -> str:
+    names = [_step(signal) for signal in signals.values()]
+    if len(set(names)) < len(names):
+        raise InputError(f"{topic}: two signals in one field")
+    attributes = {name for name, _ in names}
+    if attributes <= set(ARRAYS) and all(index is not None for _, index in names):
+        return JOINT_STATE
+    if attributes == {"fluid_pressure"}:
+        return FLUID_PRESSURE
+    if attributes == {"data"}:
+        return FLOAT64
+    fields = ", ".join(source.field for source in signals.values())
+    known = "position[0], velocity[0], effort[0], fluid_pressure or data"
+    raise InputError(f"{topic}: no message for {fields}; write to {known}")
+
+
+def _step(source: Source) -> tuple[str, int | None]:
+    match = _FIELD.fullmatch(source.field)
+    if match is None:
+        raise InputError(f"{source.topic}: {source.field!r} is not a field")
+    return match[1], None if match[2] is None else int(match[2])
+
+
+def _message(kind: str, stamp: int, names: list[str], fields: dict[str, float]) -> dict[str, Any]:
+    if kind == FLOAT64:
+        return {"data": fields["data"]}
+    seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+    header = {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": ""}
+    if kind == FLUID_PRESSURE:
+        return {"header": header, "fluid_pressure": fields["fluid_pressure"], "variance": 0.0}
+    message: dict[str, Any] = {"header": header, "name": names}
+    for array in ARRAYS:
+        given = {path: value for path, value in fields.items() if path.startswith(array)}
+        size = 1 + max((int(path[len(array) + 1 : -1]) for path in given), default=-1)
+        message[array] = [given.get(f"{array}[{k}]", math.nan) for k in range(size)]
+    return message

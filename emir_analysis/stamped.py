@@ -1,0 +1,95 @@
+"""The signals of a lock-step recording by stamp, and recorded beside replayed."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_analysis import bags
+from emir_analysis.errors import InputError
+from emir_analysis.run_signals import full_name
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import Topic
+
+Array = NDArray[np.float64]
+Signals = dict[str, float]
+
+
+@dataclass(frozen=True)
+class FieldComparison:
+    """A signal as recorded and as replayed, (n,) each, one value a period.
+
+    n = 0: an older recording that does not have the topic.
+    """
+
+    topic: str
+    name: str
+    unit: str
+    recorded: Array
+    replayed: Array
+
+    @property
+    def equal(self) -> int:
+        """Return how many samples agree in every bit."""
+        return int(np.sum(self.recorded.view(np.int64) == self.replayed.view(np.int64)))
+
+    @property
+    def largest_difference(self) -> float:
+        """Return the largest difference; nan where one of the two is not a number."""
+        differ = self.recorded.view(np.int64) != self.replayed.view(np.int64)
+        return float(np.max(np.abs(self.replayed - self.recorded)[differ], initial=0.0))
+
+
+def same(fields: Iterable[FieldComparison]) -> bool:
+    """Return whether every sample agrees in every bit."""
+    return all(field.equal == field.recorded.size for field in fields)
+
+
+def compared(
+    topics: Sequence[Topic], rows: Sequence[tuple[Signals, Signals]]
+) -> list[FieldComparison]:
+    """Return field by field what `rows`, recorded and replayed signals by period, hold."""
+    return [
+        FieldComparison(
+            topic.name,
+            name,
+            field.unit,
+            np.array([recorded[name] for recorded, _ in rows if name in recorded], dtype=float),
+            np.array([answer[name] for recorded, answer in rows if name in recorded], dtype=float),
+        )
+        for topic in topics
+        for name, field in topic.fields.items()
+    ]
+
+
+def by_stamp(bag: Path, topics: Sequence[Topic], period: int) -> dict[int, Signals]:
+    """Return the signals of each period, ns, in which every topic was recorded.
+
+    Raises InputError for a topic that is not recorded or lacks a field.
+    """
+    there = bags.recorded_topics(bag)
+    names = {topic.name: full_name(topic, there) for topic in topics}
+    for name, full in names.items():
+        if full is None:
+            raise InputError(f"{bag}: no topic {name}; there are {', '.join(sorted(there))}")
+    messages = bags.read(bag, {full for full in names.values() if full})
+    found: list[dict[int, Signals]] = []
+    for topic in topics:
+        full = names[topic.name] or ""
+        try:
+            found.append(
+                {
+                    message.stamp: conversions.values(topic, message.data)
+                    for message in messages[full]
+                    if message.stamp % period == 0
+                }
+            )
+        except LookupError as error:
+            raise InputError(f"{bag}: {full}: {error}") from None
+    stamps = set(found[0]).intersection(*found[1:])
+    return {
+        stamp: {name: value for of_topic in found for name, value in of_topic[stamp].items()}
+        for stamp in stamps
+    }

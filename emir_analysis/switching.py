@@ -1,0 +1,147 @@
+"""Several outer loops of which one drives the machine and the others hold their state ready.
+
+In each period every controller says what it would command; the selector passes on one of these.
+A controller learns a period later what was applied: where that was another's command, its own
+state follows it, and what it offers is then the command with which it would take over without a
+jump.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from emir_analysis.node_controls import NodeControl, Signals, Switchable, Topics
+from emir_analysis.outer_loop import Situation
+from emir_common.quantity import ParameterError
+from emir_msgs_py.topics import (
+    CYLINDER_PREVIEW,
+    OFFERED_COMMANDS,
+    OUTER_LOOPS,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+)
+
+
+class ReadyState(NamedTuple):
+    """A controller's state at the last period's begin, after its own step, and its inputs then."""
+
+    before: Any
+    own: Any
+    signals: Signals
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A controller of those names among which a selector chooses."""
+
+    name: str
+    control: NodeControl
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[ReadyState, Signals]:
+        """Return the next state and what is offered; signals: the selector's of a period ago, too.
+
+        A controller that is not `Switchable` begins anew when it is chosen.
+        """
+        before = start = self._caught_up(state, signals, dt)
+        stands_by = before is not None and not self._drives(signals)
+        if stands_by and isinstance(self.control, Switchable):
+            start = self.control.take_over(before, signals, signals["applied_command"], dt)
+        own, outputs = self.control.step(start, signals, dt)
+        offered = {f"{self.name}_command": outputs["velocity_command"]}
+        terms = {name: value for name, value in outputs.items() if name != "velocity_command"}
+        return ReadyState(before, own, signals), terms | offered
+
+    def _caught_up(self, state: ReadyState | None, signals: Signals, dt: float) -> Any:
+        """Return the controller's state after the period that has passed."""
+        if state is None or "applied_command" not in signals:
+            return None
+        if self._drives(signals):
+            return state.own
+        if not isinstance(self.control, Switchable):
+            return None
+        applied = signals["applied_command"]
+        return self.control.follow(state.before, state.signals, applied, dt)
+
+    def _drives(self, signals: Signals) -> bool:
+        return signals.get(f"{self.name}_active", 0.0) == 1.0
+
+
+class Switch(NamedTuple):
+    """Which controller drives from a time on, s after the start."""
+
+    time: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Selector:
+    """selector_node: hands on the command of one controller.
+
+    switches: in the order of time, the first at 0. Raises ParameterError for a name that is not
+    among the controllers or times that do not rise.
+    """
+
+    inputs: ClassVar[Topics] = tuple(OFFERED_COMMANDS.values())  # those of the controllers there
+    outputs: ClassVar[Topics] = (SELECTOR_TERMS, VELOCITY_COMMAND)
+    controllers: Sequence[str]
+    switches: Sequence[Switch]
+
+    def __post_init__(self) -> None:
+        for name in self.controllers:
+            if name not in OUTER_LOOPS:
+                raise ParameterError(f"controller {name!r}: there are {', '.join(OUTER_LOOPS)}")
+        for switch in self.switches:
+            if switch.name not in self.controllers:
+                known = ", ".join(self.controllers)
+                raise ParameterError(f"controller {switch.name!r}: running are {known}")
+        times = [switch.time for switch in self.switches]
+        if times != sorted(set(times)) or times[:1] != [0.0]:
+            raise ParameterError(f"times of switching {times}: have to rise from 0 s")
+
+    def step(self, state: int | None, signals: Signals, dt: float) -> tuple[int, Signals]:
+        """Return the number of periods and the command of the controller whose time it is."""
+        ticks = state or 0
+        return ticks + 1, self.selected(self.due(ticks, dt), signals)
+
+    def due(self, ticks: int, dt: float) -> str:
+        """Return who drives after a number of periods of dt, s, by the switches alone."""
+        return [s.name for s in self.switches if round(s.time / dt) <= ticks][-1]
+
+    @staticmethod
+    def selected(name: str, signals: Signals) -> Signals:
+        """Return the command of one controller, and that it is the one."""
+        command = signals[f"{name}_command"]
+        active = {f"{other}_active": float(other == name) for other in OUTER_LOOPS}
+        return {"velocity_command": command, "applied_command": command} | active
+
+
+@dataclass(frozen=True)
+class SwitchedLoop:
+    """The same without ROS, an `OuterLoop`. controls: by name."""
+
+    controls: Mapping[str, NodeControl]
+    switches: Sequence[Switch]
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        selector = Selector(tuple(self.controls), self.switches)
+        begin: tuple[dict[str, Any], int | None, Signals] = ({}, None, {})
+        states, ticks, fed_back = state or begin
+        known = _signals(now) | fed_back
+        after: dict[str, ReadyState] = {}
+        offered: Signals = {}
+        for name, control in self.controls.items():
+            after[name], signals = Ready(name, control).step(states.get(name), known, dt)
+            offered |= signals
+        ticks, selected = selector.step(ticks, offered, dt)
+        return (after, ticks, selected), offered | selected
+
+
+def _signals(now: Situation) -> Signals:
+    """Return a situation by the names of the topic table."""
+    reference = {
+        "reference_stroke": now.reference.stroke,
+        "reference_velocity": now.reference.velocity,
+    }
+    preview = dict(zip(CYLINDER_PREVIEW.fields, now.preview, strict=True))
+    return now.reading._asdict() | reference | preview

@@ -1,0 +1,73 @@
+"""`emir view --bag BAG`: serve the page of a recording on this computer until interrupted."""
+
+import argparse
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from emir_analysis.errors import InputError
+from emir_analysis.run_signals import load_run
+from emir_analysis.view.arm import Outline
+from emir_analysis.view.frames import frames
+from emir_plant.sheet import joint1
+
+if TYPE_CHECKING:
+    import viser
+
+HOST = "127.0.0.1"  # nobody else's business
+
+
+def command(words: list[str], live: Callable[[list[str]], int]) -> int:
+    """Serve a recording, or hand over to `live`, which knows ROS."""
+    parser = argparse.ArgumentParser(prog="emir view", description=__doc__)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--bag", type=Path, help="a recording of the graph")
+    source.add_argument("--live", action="store_true", help="the graph that is running")
+    parser.add_argument("--port", type=int, default=8080, help="of the page, default 8080")
+    options = parser.parse_args(words)
+    if options.live:
+        return live(["--ros-args", "-p", f"port:={options.port}"])
+    recording = load_run(options.bag)
+    outline = outline_of_joint1()
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    server = start_server(options.port)
+    from emir_analysis.view.page import Page
+    from emir_analysis.view.player import Player
+
+    page = Page(server, outline, f"EMIR: {options.bag.resolve().name}")
+    player = Player(server, page, frames(recording, outline.boom))
+    sys.stdout.write(f"http://localhost:{server.get_port()} shows {options.bag}; Ctrl-C ends\n")
+    sys.stdout.flush()
+    player.run(stop)
+    server.stop()
+    return 0
+
+
+def outline_of_joint1() -> Outline:
+    """Return the drawing's lengths of EMIR's joint 1."""
+    g = joint1().geometry
+    return Outline(g.boom_length, g.triangle_a, g.triangle_b, g.triangle_gamma0)
+
+
+def start_server(port: int) -> "viser.ViserServer":
+    """Return a server on this computer alone.
+
+    Raises InputError where the library is not installed or the port is taken.
+    """
+    try:
+        import viser
+    except ImportError:
+        raise InputError("needs viser: pip install 'emir_ros[view]'") from None
+    with socket.socket() as probe:
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            said = getattr(error, "strerror", None) or error
+            raise InputError(f"--port {port}: {said}") from None
+    return viser.ViserServer(host=HOST, port=port, verbose=False)

@@ -1,0 +1,257 @@
+"""LQG control of the boom about a planned move: from angles and pressures to the valve command.
+
+At a move's start the payload is read from the piston force at rest, the move is planned for it
+(`motion_plan.py`) and the regulator designed (`regulator.py`). Then, in each control period,
+
+    u = u_plan - d - L (x - x_target),    x_target = 0 but for s = f,
+
+with the state x, the unknown force f and the unknown flow d estimated by a Kalman filter. The
+drive's inverse (`actuator.py`) turns u into the valve command by the pressures as measured.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_common.quantity import check_ranges, quantity
+from emir_control.actuator import Actuator, ActuatorParameters, Oil
+from emir_control.boom import Boom, BoomTable
+from emir_control.motion_plan import MotionPlan, Target, planned, resting
+from emir_control.prefilter import joint_angle, piston_velocity
+from emir_control.regulator import Regulator, RegulatorParameters, regulator
+from emir_control.trajectory import NO_MOVE, Move
+
+Array = NDArray[np.float64]
+
+LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
+SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
+
+
+@dataclass(frozen=True, kw_only=True)
+class LqgParameters:
+    """Model and tuning.
+
+    boom: with its payloads. period: s, of control.
+    """
+
+    boom: BoomTable
+    period: float = 0.032
+    actuator: ActuatorParameters = field(default_factory=ActuatorParameters)
+    regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
+    softness: float = quantity(
+        "1", 0.1, 2.0, "of the stated k_h: oil softer than stated does more harm", default=0.94
+    )
+    allowance: float = quantity(
+        "1", 0.0, 1.0, "of the plan's deflection over the smallest, for smoothness", default=0.055
+    )
+    friction: float = quantity("N", 0.0, 1e5, "expected at the move's start", default=3e3)
+    hysteresis: float = quantity("1", 0.0, 0.1, "width of the spool's play", default=0.01)
+    standstill: float = quantity(
+        "m/s", 0.0, 0.01, "below, the valve stays shut while moving", default=5e-4
+    )
+    rest_standstill: float = quantity("m/s", 0.0, 0.01, "the same at rest", default=3e-3)
+    rest_deflection: float = quantity("m", 0.0, 1.0, "left alone at rest", default=2.5e-3)
+    rest_position: float = quantity("m", 0.0, 1.0, "of the TCP left alone at rest", default=2e-2)
+    reading_time: float = quantity(
+        "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=2.0
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+class Rest(NamedTuple):
+    """Means at rest, since it began: control periods, F, N, and bending, rad."""
+
+    periods: int
+    force: float
+    bending: float
+
+
+class LqgState(NamedTuple):
+    """Where the control stands.
+
+    start: stroke from which the next plan starts, m. offset: of the measured bending, rad, in
+    gravity of cos(alpha) = 1. estimate: (n,) x. past: u off the plan, m/s, the newest first.
+    logic: block's opening. command: the last one. moving: a move is under way.
+    """
+
+    plan: MotionPlan
+    regulator: Regulator
+    payload: float
+    offset: float
+    rest: Rest
+    estimate: Array
+    past: tuple[float, ...]
+    logic: float
+    command: float
+    moving: bool
+
+
+class LqgInputs(NamedTuple):
+    """Reference stroke, m, the move to make, and the measurements, SI units."""
+
+    reference: float
+    move: Move
+    angle: float
+    pressure_lifting: float
+    pressure_lowering: float
+    deflection: float  # alpha_6 - alpha_1
+
+
+class LqgOutputs(NamedTuple):
+    """The command and what led to it."""
+
+    valve_command: float  # y2, 1
+    planned: float  # u of the plan, m/s
+    wanted: float  # u, m/s
+    flow: float  # d, m/s
+    force: float  # f, N
+    payload: float  # kg
+    deflection: float  # dynamic, of the TCP, as estimated, m
+
+
+@dataclass(frozen=True)
+class Lqg:
+    """The control law; the planning takes some tenths of a second, a step some ten us."""
+
+    parameters: LqgParameters
+
+    @cached_property
+    def drive(self) -> Actuator:
+        """The drive as the law takes it to be."""
+        p = self.parameters
+        return Actuator(p.actuator, p.softness)
+
+    def initial(self, inputs: LqgInputs) -> LqgState:
+        """Return the state of a machine that rests with what is measured now."""
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        rest = Rest(1, force, inputs.deflection)
+        piloted = inputs.pressure_lifting > self.parameters.actuator.threshold
+        return self._begin(rest, inputs._replace(move=NO_MOVE), float(piloted), 0.0)
+
+    def step(self, state: LqgState, inputs: LqgInputs, dt: float) -> tuple[LqgState, LqgOutputs]:
+        """Return the valve command of this control period of dt, s.
+
+        An input that is not a number shuts the valve and begins anew.
+        """
+        if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
+            nan = math.nan
+            return state._replace(command=0.0), LqgOutputs(0.0, nan, nan, nan, nan, nan, nan)
+        state = self._prepared(state, inputs)
+        plan, law = state.plan, state.regulator
+        time = inputs.move.since if state.moving else math.inf
+        target = plan.at(time)
+        estimate = self._corrected(state, inputs, target)
+        from_plan = plan.velocity(time + self._late, dt)
+        wanted = from_plan + self._feedback(state, estimate)
+        shut = self._resting(law, estimate, wanted, arrived=time >= plan.duration)
+        logic = max(state.logic, LEAST_OPEN)
+        oil = Oil(target.stroke, inputs.pressure_lifting, inputs.pressure_lowering, logic)
+        opening = 0.0 if shut else self.drive.opening(wanted, oil)
+        given = self.drive.velocity(opening, oil) - from_plan
+        after = self._moved(state, estimate, given, opening, inputs)
+        outputs = LqgOutputs(
+            after.command,
+            from_plan,
+            wanted,
+            float(estimate[law.flow]),
+            float(estimate[law.force]) * plan.stiffness,
+            state.payload,
+            float(law.deflection @ estimate[: law.modes]),
+        )
+        return after, outputs
+
+    @property
+    def _late(self) -> float:
+        """From measurement to spool, s."""
+        return self.parameters.regulator.delay + self.drive.lag
+
+    def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with a plan for the move that begins, or the rest's means."""
+        if inputs.move.since >= -self._late - self.parameters.period:
+            if state.moving:
+                return state
+            return self._begin(state.rest, inputs, state.logic, state.command)
+        count = 1 if state.moving else state.rest.periods + 1
+        weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        rest = Rest(
+            count,
+            state.rest.force + weight * (force - state.rest.force),
+            state.rest.bending + weight * (inputs.deflection - state.rest.bending),
+        )
+        return state._replace(rest=rest, moving=False)
+
+    def _begin(self, rest: Rest, inputs: LqgInputs, logic: float, command: float) -> LqgState:
+        """Return the state at the start of a move, or of a rest, with what was read at rest."""
+        p, drive, move = self.parameters, self.drive, inputs.move
+        linkage = p.actuator.static
+        angle = joint_angle(inputs.reference, linkage)
+        torque = rest.force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
+        payload = p.boom.payload(torque)
+        boom = p.boom.loaded(payload)
+        plan = self._plan(boom, inputs.reference, move)
+        law = regulator(boom, drive, inputs.reference + 0.5 * move.distance, p.period, p.regulator)
+        estimate = np.zeros(len(law.A))
+        if move.distance:
+            estimate[law.force] = math.copysign(p.friction / plan.stiffness, move.distance)
+        offset = (rest.bending - float(plan.bending[0])) / math.cos(angle)
+        past = (0.0,) * law.delays
+        moving = move.distance != 0.0
+        return LqgState(plan, law, payload, offset, rest, estimate, past, logic, command, moving)
+
+    def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
+        if move.distance == 0.0:
+            return resting(boom, self.drive, start)
+        allowance = self.parameters.allowance
+        return planned(boom, self.drive, start, move, allowance)
+
+    def _corrected(self, state: LqgState, inputs: LqgInputs, target: Target) -> Array:
+        """Return x corrected by what is measured."""
+        law = state.regulator
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        bending = target.bending + state.offset * math.cos(target.angle)
+        measured = np.array([
+            inputs.angle - target.angle,
+            inputs.deflection - bending,
+            (force - target.force) / state.plan.stiffness,
+        ])  # fmt: skip
+        return state.estimate + law.kalman @ (measured - law.C @ state.estimate)
+
+    def _feedback(self, state: LqgState, estimate: Array) -> float:
+        """Return u off the plan, m/s."""
+        law = state.regulator
+        flow = float(estimate[law.flow])
+        off = np.append(estimate[: law.controlled], np.array(state.past) + flow)
+        off[law.controlled - 1] -= estimate[law.force]
+        return -flow - float(law.feedback @ off)
+
+    def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
+        """Tell whether the valve stays shut."""
+        p, q = self.parameters, estimate[: law.modes]
+        if not arrived:
+            return abs(wanted) < p.standstill
+        quiet = abs(law.deflection @ q) < p.rest_deflection
+        return bool(
+            (quiet and abs(law.position @ q) < p.rest_position) or abs(wanted) < p.rest_standstill
+        )
+
+    def _moved(
+        self, state: LqgState, estimate: Array, given: float, opening: float, inputs: LqgInputs
+    ) -> LqgState:
+        """Return the next period's state under an opening that gives u off the plan, m/s."""
+        law, period = state.regulator, self.parameters.period
+        given_all = (given, *state.past)
+        ahead = law.A @ estimate + law.B @ np.array(given_all)
+        if opening == 0.0:  # a shut valve lets no unknown flow through
+            ahead[law.flow] *= SHUT_DECAY
+        command = self.drive.command(opening)
+        if command not in {state.command, 0.0}:  # the spool's play, taken up ahead
+            command += math.copysign(0.5 * self.parameters.hysteresis, command - state.command)
+        logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, period)
+        return state._replace(estimate=ahead, past=given_all[:-1], logic=logic, command=command)

@@ -1,0 +1,185 @@
+"""Observer and feedback of the LQG control: linear model about a posture, and both gains.
+
+With s = F / k_h, metres of oil, deviations from a plan obey
+
+    q'' + D q' + K q = J r k_h (s - f) + (F_0 dr/dalpha J + W sin(alpha)) J^T q
+    s' = u + d - r J^T q'
+
+f: unknown force, friction for one; d: unknown flow; both change slowly. u acts late.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_are
+
+from emir_common.quantity import check_ranges, quantity
+from emir_control.actuator import Actuator
+from emir_control.boom import Boom
+from emir_control.prefilter import joint_angle, piston_velocity
+
+Array = NDArray[np.float64]
+
+SLOPE_STEP = 1e-5  # rad
+FLOOR = 1e-18  # of the process noise: what keeps the Riccati equation well posed
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegulatorParameters:
+    """Noise that the Kalman filter reckons with, and what the feedback weighs.
+
+    Of the weights the size that counts as one; drifts and noise are standard deviations, drifts
+    from sample to sample.
+    """
+
+    modes: int = quantity("1", 2, 16, "of the boom in the model", default=3)
+    delay: float = quantity("s", 0.0, 0.2, "from measurement to valve current", default=0.0)
+    flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=1e-4)
+    force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=1e-5)
+    velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=1e-3)
+    angle_noise: float = quantity(
+        "rad", 1e-7, 0.1, "of the resolver; 12 bits of a turn", default=4.4e-4
+    )
+    bending_noise: float = quantity("rad", 1e-7, 0.1, "of the strain gauges", default=3e-5)
+    force_noise: float = quantity("N", 1.0, 1e6, "of the force by pressures", default=1.5e3)
+    deflection_weight: float = quantity("m", 1e-5, 1.0, "dynamic deflection", default=1e-3)
+    position_weight: float = quantity("m", 1e-5, 1.0, "TCP off its place", default=1.5e-2)
+    velocity_weight: float = quantity("m/s", 1e-5, 1.0, "u off the plan", default=2.5e-3)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Regulator:
+    """x(k+1) = A x + B [u(k), u(k-1) ...], y = C x, with x = (q, q', s, f, d).
+
+    modes: m in q. A: (n, n), n = 2 m + 3. B: (n, l + 1), for u now and l past ones. C: (3, n):
+    joint angle, rad, bending, rad, s, m. kalman: (n, 3). feedback: (2 m + 1 + l,), on (q, q', s)
+    and the past u. cost: its matrix of the cost to go. deflection, position: (m,) of the TCP, m.
+    velocity_weight: m/s.
+    """
+
+    modes: int
+    A: Array
+    B: Array
+    C: Array
+    kalman: Array
+    feedback: Array
+    cost: Array
+    stage: Array
+    deflection: Array
+    position: Array
+
+    @property
+    def controlled(self) -> int:
+        """Return how many states the feedback acts on: all but f and d."""
+        return 2 * self.modes + 1
+
+    @property
+    def delays(self) -> int:
+        """Return l."""
+        return int(self.B.shape[1]) - 1
+
+    @property
+    def force(self) -> int:
+        """Return the index of f."""
+        return 2 * self.modes + 1
+
+    @property
+    def flow(self) -> int:
+        """Return the index of d."""
+        return 2 * self.modes + 2
+
+
+def regulator(
+    boom: Boom, drive: Actuator, stroke: float, period: float, p: RegulatorParameters
+) -> Regulator:
+    """Return the regulator about rest at a stroke, m, for control periods of a length, s."""
+    m = min(p.modes, len(boom.joint))
+    continuous, stiffness = _continuous(boom, drive, stroke, m)
+    A, B = _sampled(continuous, period, p.delay + drive.lag)
+    C = np.zeros((3, len(A)))
+    C[0, :m], C[1, :m], C[2, 2 * m] = boom.joint[:m], (boom.tip_angle - boom.joint)[:m], 1.0
+    extended, driven = _with_past(A, B, m)
+    stage = np.zeros_like(extended)
+    for row, size in ((boom.deflection, p.deflection_weight), (boom.tip, p.position_weight)):
+        stage[:m, :m] += np.outer(row[:m], row[:m]) / size**2
+    stage += 1e-9 * np.eye(len(stage))
+    effort = np.array([[1.0 / p.velocity_weight**2]])
+    cost = solve_discrete_are(extended, driven, stage, effort)
+    feedback = np.linalg.solve(effort + driven.T @ cost @ driven, driven.T @ cost @ extended)[0]
+    return Regulator(
+        modes=m,
+        A=A,
+        B=B,
+        C=C,
+        kalman=_kalman(A, B, C, stiffness, p),
+        feedback=feedback,
+        cost=cost,
+        stage=stage,
+        deflection=boom.deflection[:m],
+        position=boom.tip[:m],
+    )
+
+
+def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Array, float]:
+    """Return [A B], (n, n + 1), of the deviations, and k_h, N/m."""
+    linkage = drive.parameters.static
+    angle = joint_angle(stroke, linkage)
+    arm = piston_velocity(1.0, angle, linkage)
+    ahead, behind = (piston_velocity(1.0, angle + d, linkage) for d in (SLOPE_STEP, -SLOPE_STEP))
+    force = boom.holding_torque * math.cos(angle) / arm
+    stiffness = drive.stiffness(stroke)
+    joint, n = boom.joint[:m], 2 * m + 3
+    follower = joint * force * (ahead - behind) / (2.0 * SLOPE_STEP)
+    follower = follower + boom.weight[:m] * math.sin(angle)
+    model = np.zeros((n, n + 1))
+    model[:m, m : 2 * m] = np.eye(m)
+    model[m : 2 * m, :m] = np.outer(follower, joint) - np.diag(boom.stiffness[:m])
+    model[m : 2 * m, m : 2 * m] = -np.diag(boom.damping[:m])
+    model[m : 2 * m, 2 * m] = joint * arm * stiffness
+    model[m : 2 * m, 2 * m + 1] = -joint * arm * stiffness
+    model[2 * m, m : 2 * m] = -arm * joint
+    model[2 * m, 2 * m + 2] = model[2 * m, n] = 1.0
+    return model, stiffness
+
+
+def _sampled(continuous: Array, period: float, late: float) -> tuple[Array, Array]:
+    """Return A, (n, n), and B, (n, l + 1), of an input that is held and comes late, s."""
+    n = len(continuous)
+
+    def held(time: float) -> tuple[Array, Array]:
+        both = expm(time * np.vstack([continuous, np.zeros((1, n + 1))]))
+        return both[:n, :n], both[:n, n]
+
+    whole, part = divmod(late, period)
+    past = int(whole)
+    rest, newer = held(period - part)
+    _, older = held(part)
+    B = np.zeros((n, past + 2))
+    B[:, past], B[:, past + 1] = newer, rest @ older
+    return held(period)[0], B
+
+
+def _with_past(A: Array, B: Array, m: int) -> tuple[Array, Array]:
+    """Return the model of (q, q', s, past u): what the feedback acts on."""
+    c, past = 2 * m + 1, B.shape[1] - 1
+    extended = np.zeros((c + past, c + past))
+    extended[:c, :c], extended[:c, c:] = A[:c, :c], B[:c, 1:]
+    extended[c + 1 :, c:-1] = np.eye(past - 1)
+    driven = np.zeros((c + past, 1))
+    driven[:c, 0], driven[c, 0] = B[:c, 0], 1.0
+    return extended, driven
+
+
+def _kalman(A: Array, B: Array, C: Array, stiffness: float, p: RegulatorParameters) -> Array:
+    driven = B.sum(axis=1)
+    noise = p.velocity_noise**2 * np.outer(driven, driven) + FLOOR * np.eye(len(A))
+    noise[-2, -2] += p.force_drift**2
+    noise[-1, -1] += p.flow_drift**2
+    sensors = np.diag([p.angle_noise, p.bending_noise, p.force_noise / stiffness]) ** 2
+    P = solve_discrete_are(A.T, C.T, noise, sensors)
+    return np.asarray(np.linalg.solve(C @ P @ C.T + sensors, C @ P).T)

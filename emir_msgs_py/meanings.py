@@ -1,0 +1,62 @@
+"""What each signal of the topic table means, in words; recordings carry it beside path and unit."""
+
+from emir_msgs_py.topics import OUTER_LOOPS, Topic
+
+MEANINGS = {
+    "angle": "joint angle alpha_1, measured by the resolver",
+    "stroke": "piston stroke h_1, from the resolver's angle by the linkage",
+    "force": "piston force from the measured pressures",
+    "pressure_lifting": "pressure in the chamber whose oil lifts, absolute, measured",
+    "pressure_lowering": "pressure in the chamber whose oil lowers, absolute, measured",
+    "deflection": "angle by which the boom's tip is bent away from the joint's, measured",
+    "true_angle": "joint angle alpha_1",
+    "true_tip_angle": "inclination of the boom's tip, alpha_6",
+    "true_stroke": "piston stroke h_1",
+    "true_velocity": "piston velocity",
+    "true_force": "force of the piston on the linkage",
+    "true_pressure_lifting": "pressure in the chamber whose oil lifts, absolute",
+    "true_pressure_lowering": "pressure in the chamber whose oil lowers, absolute",
+    "flow_lifting": "oil flow into the lifting chamber, Q_H",
+    "flow_lowering": "oil flow into the lowering chamber, Q_S",
+    "spool": "position of the valve's spool y_2, -1 to 1",
+    "logic_block": "opening of the logic block, 0 to 1",
+    "tcp_deflection": "deflection of the tool centre point across the boom",
+    "reference_stroke": "demanded piston stroke h_d",
+    "reference_velocity": "demanded piston velocity dh_d/dt",
+    "velocity_command": "piston velocity that the outer controller asks for",
+    "valve_command": "commanded opening of the valve, -1 to 1",
+    "feedforward": "share of the cascade's command from the demanded velocity",
+    "feedback": "share of the cascade's command from the position error",
+    "smoothed_reference": "demanded stroke behind the first-order lag T",
+    "measured_force": "piston force from pressures, as the force loop sees it",
+    "force_feedback": "velocity taken off the command by the force feedback",
+    "wanted_velocity": "command less force feedback: what the prefilter turns into an opening",
+    "saturated": "1 where the valve command is at its limit",
+}
+MEANINGS |= {
+    f"reference_stroke_{k}_ahead": f"demanded stroke {k} control periods ahead"
+    for k in range(1, 21)
+}
+PFC_MEANINGS = {
+    "unlimited": "command before its limits",
+    "reference_term": "share of the reference trajectory in the command",
+    "model_term": "share of the internal model's state",
+    "command_term": "share of the past commands",
+    "error_term": "share of the extrapolated model error",
+    "model_error": "measured output less the internal model's",
+    "limited": "1 where the command is at its limit",
+}
+MEANINGS |= {
+    f"{name}_{term}": text for name in ("pfc", "pfc_tip") for term, text in PFC_MEANINGS.items()
+}
+MEANINGS |= {f"{name}_command": f"piston velocity that {name} asks for" for name in OUTER_LOOPS}
+MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in OUTER_LOOPS}
+MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
+
+
+def field_table(topic: Topic) -> dict[str, dict[str, str]]:
+    """Return {signal: {path, unit, meaning}} of a topic. Raises KeyError without a meaning."""
+    return {
+        signal: {"path": field.path, "unit": field.unit, "meaning": MEANINGS[signal]}
+        for signal, field in topic.fields.items()
+    }

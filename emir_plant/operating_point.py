@@ -1,0 +1,92 @@
+"""Steady motion through a posture: the operating points about which the machine is linearized.
+
+The boom turns as a whole, both pressures stand still, the logic block is open. At rest the valve
+is in its dead zone and no command would move anything.
+"""
+
+import math
+from collections.abc import Callable
+
+from scipy.optimize import root
+
+from emir_plant import core, linkage
+from emir_plant.core import Array
+from emir_plant.plant import Plant, SimulationError
+
+BAR = 1e5
+GUESSES = (30.0, 5.0, 100.0)  # bar, of the lowering chamber
+
+
+def at_velocity(plant: Plant, angle: float, velocity: float) -> tuple[Array, float]:
+    """Return state and valve command of the steady motion at a boom angle, rad.
+
+    velocity: of the piston, m/s, not 0. Raises SimulationError where there is no such motion.
+    """
+    valve, cylinder = plant.machine.valve, plant.machine.cylinder
+    area, full = cylinder.area_lifting, valve.flow_nominal
+    if velocity < 0.0 and valve.balance_lowering == 0:
+        area, full = cylinder.area_lowering, full * valve.flow_ratio_lowering
+    opening = min(abs(velocity) * area / full, 1.0)
+    guess = math.copysign(valve.dead_zone + (1.0 - valve.dead_zone) * opening, velocity)
+    found = _solution(plant, angle, lambda command: (velocity, command), guess)
+    if found is None or abs(found[1]) > 1.0:
+        raise SimulationError(
+            f"no steady motion of {velocity * 1e3:g} mm/s at {math.degrees(angle):.0f} deg"
+            f" with {plant.machine.geometry.payload:g} kg"
+        )
+    return found
+
+
+def under_command(plant: Plant, angle: float, command: float) -> Array:
+    """Return the state of the steady motion under a valve command at a boom angle, rad.
+
+    Raises SimulationError where there is no such motion.
+    """
+    valve = plant.machine.valve
+    opening = max(abs(command) - valve.dead_zone, 0.0) / (1.0 - valve.dead_zone)
+    if opening == 0.0:
+        raise SimulationError(f"y2 = {command:g}: in the valve's dead zone nothing moves")
+    guess = math.copysign(opening * valve.flow_nominal, command)
+    guess /= plant.machine.cylinder.area_lifting
+    found = _solution(plant, angle, lambda velocity: (velocity, command), guess)
+    if found is None:
+        raise SimulationError(
+            f"no steady motion with y2 = {command:g} at {math.degrees(angle):.0f} deg"
+            f" with {plant.machine.geometry.payload:g} kg"
+        )
+    return found[0]
+
+
+def _solution(
+    plant: Plant, angle: float, motion: Callable[[float], tuple[float, float]], guess: float
+) -> tuple[Array, float] | None:
+    """Return the state at which both pressures stand still, and the command; None if there is none.
+
+    motion: from the unknown beside the lowering chamber's pressure to velocity and command.
+    Raises SimulationError as `Plant.initial`.
+    """
+
+    def rates(unknown: Array) -> Array:
+        velocity, command = motion(float(unknown[1]))
+        state = _state(plant, angle, float(unknown[0]) * BAR, velocity, command)
+        return plant.derivative(state, command)[[core.P_H, core.P_S]] / BAR
+
+    plant.initial(angle)  # says so where the cylinder cannot hold the boom at all
+    for pressure in GUESSES:
+        try:
+            found = root(rates, [pressure, guess])
+        except SimulationError:  # on the way to a pressure that the cylinder cannot have
+            continue
+        if found.success and found.x[0] >= 0.0:
+            velocity, command = motion(float(found.x[1]))
+            return _state(plant, angle, float(found.x[0]) * BAR, velocity, command), command
+    return None
+
+
+def _state(plant: Plant, angle: float, pressure: float, velocity: float, command: float) -> Array:
+    p = plant.record[0]
+    x = plant.initial(angle, pressure)
+    x[core.SPOOL], x[core.LOGIC] = command, 1.0
+    rate = velocity / linkage.lever_arm(angle, p)
+    x[core.MODES + p["mode_joint"].size] = rate / p["mode_joint"][0]
+    return x

@@ -1,0 +1,67 @@
+"""All parameters of other nodes, asked for by the standard parameter services."""
+
+import json
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+
+if TYPE_CHECKING:
+    from rclpy.task import Future
+
+PERIOD = 0.02  # s between looks whether the nodes have been discovered
+
+
+class ParameterRecord:
+    """Asks the named nodes as soon as they are there, and hands over what they answered.
+
+    nodes: names, in the namespace of `node`. found(answers) is called once, when all have
+    answered: {node: {parameter: value}}, both in alphabetical order.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        nodes: Sequence[str],
+        found: Callable[[dict[str, dict[str, Any]]], None],
+    ) -> None:
+        self._clients = {name: AsyncParameterClient(node, name) for name in nodes}
+        self._waiting = set(nodes)
+        self._answers: dict[str, dict[str, Any]] = {}
+        self._found = found
+        self._timer = node.create_timer(PERIOD, self._look)
+        self._futures: list[Future] = []  # kept: nobody else holds them until they are done
+
+    def _look(self) -> None:
+        for name in sorted(self._waiting):
+            if self._clients[name].services_are_ready():
+                self._waiting.remove(name)
+                self._futures.append(
+                    self._clients[name].list_parameters(
+                        callback=lambda future, name=name: self._listed(name, future.result())
+                    )
+                )
+        if not self._waiting:
+            self._timer.cancel()
+
+    def _listed(self, node: str, answer: ListParameters.Response) -> None:
+        names = sorted(answer.result.names)
+        self._futures.append(
+            self._clients[node].get_parameters(
+                names, callback=lambda future: self._got(node, names, future.result())
+            )
+        )
+
+    def _got(self, node: str, names: list[str], answer: GetParameters.Response) -> None:
+        values = map(parameter_value_to_python, answer.values)
+        self._answers[node] = dict(zip(names, values, strict=True))
+        if len(self._answers) == len(self._clients):
+            self._found(dict(sorted(self._answers.items())))
+
+
+def as_metadata(answers: dict[str, dict[str, Any]]) -> dict[str, str]:
+    """Return the answers as a metadata record holds them: JSON by node."""
+    return {node: json.dumps(values, default=list) for node, values in answers.items()}

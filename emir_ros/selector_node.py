@@ -1,0 +1,88 @@
+"""selector_node: which of several controllers drives the machine.
+
+    ros2 param set /selector_node controller pfc
+
+changes it while the machine moves.
+"""
+
+from collections.abc import Collection, Sequence
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
+
+from emir_analysis.switching import Selector, Switch
+from emir_common.quantity import ParameterError
+from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
+from emir_ros.main import run
+from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.shell import ControlNode, Signals
+
+
+class SelectorNode(ControlNode):
+    """<controller>/velocity_command of each -> velocity_command, selector/terms."""
+
+    consequence = "no command"
+
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        # The controllers are known only once the node is there to read its parameters.
+        super().__init__("selector_node", [], Selector.outputs, arguments)
+        names: list[str] = declare(self, "controllers", list(OUTER_LOOPS), "those that run")
+        times: list[float] = declare(self, "switch_times", [0.0], "when to switch [s]")
+        switched: list[str] = declare(self, "switch_to", [names[0]], "to what, beginning with 0 s")
+        if len(times) != len(switched):
+            raise ParameterError("selector_node: switch_times and switch_to differ in length")
+        try:
+            self.law = Selector(
+                names, [Switch(*pair) for pair in zip(times, switched, strict=True)]
+            )
+        except ParameterError as error:
+            raise ParameterError(f"selector_node: {error}") from None
+        about = f"which one drives, of {', '.join(names)}; may be set at any time"
+        self.declare_parameter("controller", switched[0], ParameterDescriptor(description=about))
+        self._chosen: str = self.get_parameter("controller").value
+        self._check(self._chosen)
+        self.add_on_set_parameters_callback(self._on_set)
+        self._ticks = 0
+        reject_unknown(self)
+        for name in names:
+            self.take(OFFERED_COMMANDS[name])
+
+    def control(self, signals: Signals, dt: float) -> Signals:
+        """Return the command of the controller that is chosen."""
+        due = self.law.due(self._ticks, dt)
+        if self._ticks and due != self.law.due(self._ticks - 1, dt):
+            self._chosen = due
+        self._ticks += 1
+        return self.law.selected(self._chosen, signals)
+
+    def needed(self) -> Collection[str]:
+        """Return the one command that matters; the others may be missing."""
+        return (OFFERED_COMMANDS[self._chosen].name,)
+
+    def status(self) -> str:
+        """Return who drives."""
+        return f"{self._chosen} drives the machine"
+
+    def _check(self, name: str) -> None:
+        if name not in self.law.controllers:
+            known = ", ".join(self.law.controllers)
+            raise ParameterError(f"selector_node: controller {name!r}: running are {known}")
+
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == "controller":
+                try:
+                    self._check(parameter.value)
+                except ParameterError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+                self._chosen = parameter.value
+        return SetParametersResult(successful=True)
+
+
+def main() -> None:
+    """Run the node until it is stopped."""
+    run(SelectorNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""view_node: the running graph as a page in the browser (`emir view --live`). It only listens."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+
+from emir_analysis.errors import InputError
+from emir_analysis.view.command import outline_of_joint1, start_server
+from emir_analysis.view.frames import Frame, tcp_deflection
+from emir_common.quantity import ParameterError
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import (
+    BOOM_DEFLECTION,
+    CYLINDER_REFERENCE,
+    CYLINDER_STATES,
+    JOINT_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    TRUTH,
+    VALVE_COMMAND,
+    Topic,
+)
+from emir_ros import qos
+from emir_ros.main import run
+from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.shell import Shell
+
+SHOWN = (
+    JOINT_STATES,
+    CYLINDER_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    BOOM_DEFLECTION,
+    CYLINDER_REFERENCE,
+    VALVE_COMMAND,
+    TRUTH,  # a real machine has none
+)
+PERIOD = 0.1  # s, of the page
+KEPT = 300  # frames: the last 30 s
+HIGHEST_PORT = 65535
+
+
+class ViewNode(Shell):
+    """Sensors, reference and valve command -> a page on this computer."""
+
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        super().__init__("view_node", [], arguments)
+        port: int = declare(self, "port", 8080, "of the page")
+        reject_unknown(self)
+        if not 0 < port <= HIGHEST_PORT:
+            raise ParameterError(f"view_node: port = {port}: outside 1 ... {HIGHEST_PORT}")
+        self._signals: dict[str, float] = {}
+        self._stamp = math.nan
+        self._history: deque[Frame] = deque(maxlen=KEPT)
+        for topic in SHOWN:
+            self._listen(topic)
+        try:
+            self._server = start_server(port)
+        except InputError as error:
+            raise ParameterError(f"view_node: {error}") from None
+        from emir_analysis.view.page import Page
+
+        self._outline = outline_of_joint1()
+        self._page = Page(self._server, self._outline, "EMIR, live")
+        self.create_timer(PERIOD, self._show, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.get_logger().info(f"http://localhost:{port} shows the graph")
+
+    @property
+    def shown(self) -> str:
+        """Return the numbers on the page, as Markdown."""
+        return self._page.readings
+
+    def close(self) -> None:
+        """Close the page."""
+        self._server.stop()
+
+    def _listen(self, topic: Topic) -> None:
+        def receive(message: Any) -> None:
+            self._signals.update(conversions.values(topic, message))
+            self._stamp = conversions.stamp_ns(message) / conversions.NANOSECONDS
+
+        kind = conversions.message_class(topic.type)
+        profile = qos.requested(topic, lockstep=False)
+        self.create_subscription(kind, topic.name, receive, profile)
+
+    def _show(self) -> None:
+        if math.isnan(self._stamp) or (self._history and self._stamp <= self._history[-1].time):
+            return  # nothing new
+        self._history.append(frame(self._stamp, self._signals, self._outline.boom))
+        self._page.show(self._history[-1])
+        if len(self._history) > 1:
+            self._page.plot(list(self._history), self._stamp)
+
+
+def frame(time: float, signals: dict[str, float], length: float) -> Frame:
+    """Return what is known at a time, s, from the latest signals; length: of the boom, m."""
+    known = {name: signals.get(name, math.nan) for name in Frame._fields}
+    bent = float(tcp_deflection(signals.get("deflection", math.nan), length))
+    return Frame(**(known | {"time": time, "tcp_deflection": signals.get("tcp_deflection", bent)}))
+
+
+def main() -> None:
+    """Show the graph until stopped."""
+    run(ViewNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Split, compressed and flushed recordings, read by `rosbags` and by mcap's own reader."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from mcap.records import Schema
+from rosbags.highlevel import AnyReader
+
+from emir_analysis import bags
+from emir_analysis.info import info
+from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_common.quantity import ParameterError
+
+HEADER = Schema(
+    0,
+    b"builtin_interfaces/Time stamp\nstring frame_id\n" + b"=" * 80
+    + b"\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+    "ros2msg",
+    "std_msgs/msg/Header",
+)  # fmt: skip
+SECOND = 1_000_000_000
+
+
+def _header(k: int) -> bytes:
+    """A std_msgs/Header in CDR: encapsulation, sec, nanosec, empty string."""
+    return b"\0\1\0\0" + k.to_bytes(4, "little") + bytes(4) + b"\1\0\0\0\0"
+
+
+def _write(writer: Rosbag2Writer, count: int) -> None:
+    """One message a second on /a."""
+    writer.add_metadata("emir", {"controller": "cascade"})
+    writer.add_topic("/a", HEADER, {})
+    for k in range(count):
+        writer.write("/a", _header(k), k * SECOND, k * SECOND)
+
+
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_a_recording_split_by_time_is_one_to_its_readers(compression: str, tmp_path: Path) -> None:
+    with Rosbag2Writer(tmp_path / "bag", compression, max_duration=2.0) as writer:
+        _write(writer, 25)
+    names = [file.name for file in bags.files(tmp_path / "bag")]
+    assert names == [f"bag_{k}.mcap" for k in range(13)]
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert [data for _, _, data in reader.messages()] == [_header(k) for k in range(25)]
+        assert reader.message_count == 25
+        assert reader.duration == 24 * SECOND + 1  # rosbags counts the last nanosecond
+    assert [m.data.stamp.sec for m in bags.read(tmp_path / "bag")["/a"]] == list(range(25))
+    assert info(tmp_path / "bag").topics["/a"].count == 25
+    about = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
+    entries = about["rosbag2_bagfile_information"]["files"]
+    assert [entry["message_count"] for entry in entries] == [2] * 12 + [1]
+    for name in names:  # each explains itself
+        with (tmp_path / "bag" / name).open("rb") as stream:
+            stored = {r.name: r.metadata for r in make_reader(stream).iter_metadata()}
+        assert stored["emir"] == {"controller": "cascade"}
+
+
+def test_a_file_that_has_grown_to_its_size_is_followed_by_another(tmp_path: Path) -> None:
+    with Rosbag2Writer(tmp_path / "bag", max_size=300_000) as writer:
+        writer.add_topic("/a", HEADER, {})
+        for k in range(1000):
+            writer.write("/a", bytes(1000), k, k)
+    sizes = [file.stat().st_size for file in bags.files(tmp_path / "bag")]
+    assert len(sizes) == 4  # of a megabyte
+    assert max(sizes) < 300_000 + 2 * 64 * 1024 + 10_000  # a chunk, then the index
+
+
+def test_zstd_is_smaller_and_the_same(tmp_path: Path) -> None:
+    sizes = {}
+    for compression in ("none", "zstd"):
+        with Rosbag2Writer(tmp_path / compression, compression) as writer:
+            _write(writer, 5000)
+        sizes[compression] = next((tmp_path / compression).glob("*.mcap")).stat().st_size
+    assert sizes["zstd"] < 0.7 * sizes["none"]
+
+
+def test_an_unknown_compression_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="compression 'zip': there are none, zstd"):
+        Rosbag2Writer(tmp_path / "bag", "zip")
+    assert not (tmp_path / "bag").exists()
+
+
+def test_what_was_flushed_outlives_the_process(tmp_path: Path) -> None:
+    """Killed by SIGKILL right behind a flush: all is there, although no chunk was full."""
+    script = (
+        "import os, signal, sys; from pathlib import Path; from mcap.records import Schema;"
+        "from emir_analysis.rosbag2_writer import Rosbag2Writer;"
+        "w = Rosbag2Writer(Path(sys.argv[1]));"
+        "w.add_topic('/a', Schema(0, b'byte[] data', 'ros2msg', 'x/msg/Bytes'), {});"
+        "[w.write('/a', bytes(10), k, k) for k in range(30)];"
+        "w.flush();"
+        "os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "bag")], env=os.environ, check=False
+    )
+    assert finished.returncode == -signal.SIGKILL
+    assert info(tmp_path / "bag").topics["/a"].count == 30

@@ -1,0 +1,218 @@
+"""docs/faults.md, row by row: what is not already shown by test_safety, test_graph, test_recover.
+
+Faults of time and transport are driven by /clock, so that the computer's load has no part in them.
+"""
+
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rosbags.highlevel import AnyReader
+from rosgraph_msgs.msg import Clock
+
+from emir_analysis.recover import recover
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    JOINT_STATES,
+    PLANT_PERIOD_NS,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    VALVE_COMMAND,
+    VELOCITY_COMMAND,
+)
+from emir_ros import qos
+from emir_ros.force_loop_node import TIMEOUT, ForceLoopNode
+
+HOUR = 3600 * 1_000_000_000
+INPUTS = (VELOCITY_COMMAND, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING)
+SIGNALS = {
+    "velocity_command": 0.02,
+    "angle": 0.8,
+    "pressure_lifting": 1e7,
+    "pressure_lowering": 2e6,
+}
+DEADLINE = 30.0  # s
+
+
+class Bench:
+    """The force loop on a test bench: time and inputs are given to it, its commands heard."""
+
+    def __init__(self) -> None:
+        self.loop = ForceLoopNode(["--ros-args", "-p", "use_sim_time:=true"])
+        self.node = Node("bench")
+        self.valve: list[float] = []
+        profile = qos.offered(lockstep=False)
+        self._clock = self.node.create_publisher(Clock, "/clock", 10)
+        self._inputs = {
+            topic.name: self.node.create_publisher(
+                conversions.message_class(topic.type), topic.name, profile
+            )
+            for topic in INPUTS
+        }
+        kind = conversions.message_class(VALVE_COMMAND.type)
+        self.node.create_subscription(kind, VALVE_COMMAND.name, self._on_valve, profile)
+        self._executor = SingleThreadedExecutor()
+        for node in (self.loop, self.node):
+            self._executor.add_node(node)
+        self.now = HOUR
+        self.until(self._connected)
+
+    def _connected(self) -> bool:
+        return all(p.get_subscription_count() for p in (self._clock, *self._inputs.values()))
+
+    def _on_valve(self, message: Any) -> None:
+        self.valve.append(conversions.values(VALVE_COMMAND, message)["valve_command"])
+
+    def until(self, condition: Callable[[], object]) -> None:
+        """Spin until the condition holds."""
+        deadline = time.monotonic() + DEADLINE
+        while not condition():
+            assert time.monotonic() < deadline
+            self._executor.spin_once(timeout_sec=0.01)
+
+    def tick(self, inputs: Any = INPUTS, step: int = PLANT_PERIOD_NS) -> None:
+        """Let time go on by a step, ns, and then give the inputs."""
+        self.now += step
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(self.now, 1_000_000_000)
+        self._clock.publish(clock)
+        self.until(lambda: self.loop.get_clock().now().nanoseconds == self.now)
+        for topic in inputs:
+            self._inputs[topic.name].publish(conversions.message(topic, self.now, SIGNALS))
+        for _ in range(4 * len(INPUTS)):  # what has come is taken, and a timer that is due
+            self._executor.spin_once(timeout_sec=0.001)
+
+    def settle(self) -> None:
+        """Run until the valve opens."""
+        deadline = time.monotonic() + DEADLINE
+        while not (self.valve and self.valve[-1] > 0.0):
+            assert time.monotonic() < deadline
+            self.tick()
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    rclpy.init()
+    made = Bench()
+    made.settle()
+    yield made
+    rclpy.shutdown()
+
+
+def test_one_message_in_twenty_lost_changes_nothing(bench: Bench) -> None:
+    """Sensors come four times a period, a command is kept: the valve never shuts."""
+    before = len(bench.valve)
+    for k in range(80):
+        lost = INPUTS[(k // 5) % len(INPUTS)] if k % 5 == 0 else None
+        bench.tick([topic for topic in INPUTS if topic is not lost])
+    assert len(bench.valve) > before + 15  # a command each period
+    assert min(bench.valve[before:]) > 0.0
+
+
+def test_commands_late_by_100_ms_shut_the_valve_and_open_it_when_they_come(bench: Bench) -> None:
+    late = [topic for topic in INPUTS if topic is not VELOCITY_COMMAND]
+    silent = 0
+    while bench.valve[-1] != 0.0:
+        assert silent * PLANT_PERIOD_NS < TIMEOUT * 1e9 + CONTROL_PERIOD_NS
+        bench.tick(late)
+        silent += 1
+    for _ in range(round(0.1e9 / PLANT_PERIOD_NS) - silent):
+        bench.tick(late)
+        assert bench.valve[-1] == 0.0
+    before = len(bench.valve)
+    while bench.valve[-1] == 0.0:
+        assert len(bench.valve) < before + 3
+        bench.tick()
+
+
+@pytest.mark.parametrize("jump", [-HOUR // 2, HOUR], ids=["back", "forward"])
+def test_a_jump_of_the_clock_shuts_the_valve_until_inputs_are_new(bench: Bench, jump: int) -> None:
+    """What was heard before the jump is not trusted, also where its time is still to come."""
+    bench.tick([], jump)
+    before = len(bench.valve)
+    for _ in range(8):
+        bench.tick([])
+    assert len(bench.valve) > before
+    assert not any(bench.valve[before + 1 :])
+    bench.settle()
+    assert bench.valve[-1] > 0.0
+
+
+def test_a_stranger_on_the_commands_topic_shuts_the_valve(bench: Bench) -> None:
+    """Somebody publishes text under the command's name: not taken for it, and not ignored."""
+    script = (
+        "import rclpy; from std_msgs.msg import String; rclpy.init();"
+        "node = rclpy.create_node('stranger');"
+        "publisher = node.create_publisher(String, 'velocity_command', 10);"
+        "node.create_timer(0.01, lambda: publisher.publish(String(data='faster')));"
+        "rclpy.spin(node)"
+    )
+    with subprocess.Popen([sys.executable, "-c", script]) as stranger:
+        try:
+            deadline = time.monotonic() + DEADLINE
+            while bench.valve[-1] != 0.0:
+                assert time.monotonic() < deadline
+                bench.tick()
+        finally:
+            stranger.kill()
+    bench.settle()
+    assert bench.valve[-1] > 0.0
+
+
+def test_a_full_disk_ends_the_recording_and_keeps_it(tmp_path: Path) -> None:
+    """A limit on the file's size stands for the end of the disk; the system says the same."""
+    bag, limit = tmp_path / "run", 400_000
+    command = [sys.executable, "-m", "emir_ros.run", "--duration", "60", "--bag", str(bag)]
+    finished = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )
+    assert finished.returncode == 1
+    (line,) = [line for line in finished.stderr.splitlines() if "recording ended" in line]
+    assert line.startswith(f"emir run: recorder_node: {bag}/run_0.mcap: File too large")
+    assert "Traceback" not in finished.stderr
+    saved = recover(bag, tmp_path / "whole")
+    assert saved.messages > 0
+    with AnyReader([tmp_path / "whole"]) as reader:
+        assert reader.message_count == saved.messages
+        times = sorted(time for c, time, _ in reader.messages() if c.topic == "/truth")
+    assert times == list(range(0, times[-1] + 1, PLANT_PERIOD_NS))  # nothing lost before
+
+
+def test_memory_stays_flat_in_lock_step(tmp_path: Path) -> None:
+    """Between 10 s and 40 s of the run, by the recording's size, it grows by less than 1 %."""
+    file = tmp_path / "run" / "run_0.mcap"
+    command = [sys.executable, "-m", "emir_ros.run", "--duration", "600", "--bag", str(file.parent)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            used = []
+            for size in (1_500_000, 6_000_000):
+                deadline = time.monotonic() + 4 * DEADLINE
+                while not file.exists() or file.stat().st_size < size:
+                    assert process.poll() is None
+                    assert time.monotonic() < deadline
+                used.append(_resident(process.pid))
+        finally:
+            process.kill()
+    assert used[1] < 1.01 * used[0]
+
+
+def _resident(pid: int) -> int:
+    """Return the memory that a process holds, in pages."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1])

@@ -1,0 +1,253 @@
+"""What the graph does when a node dies, a number is none, two command at once, one is switched."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    CYLINDER_REFERENCE,
+    JOINT_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    VALVE_COMMAND,
+    VELOCITY_COMMAND,
+    Topic,
+)
+from emir_ros import qos
+from emir_ros.cascade_node import CascadeNode
+from emir_ros.force_loop_node import ForceLoopNode
+from emir_ros.pfc_node import PfcNode
+from emir_ros.plant_node import PlantNode
+from emir_ros.selector_node import SelectorNode
+from emir_ros.shell import NodeError, Shell
+from emir_ros.trajectory_node import TrajectoryNode
+
+AT_ONCE = ["--ros-args", "-p", "delay:=0.2"]
+STANDBY = ["--ros-args", "-p", "standby:=true"]
+LOCKSTEP = ["--ros-args", "-p", "lockstep:=true"]
+INPUTS = (
+    (VELOCITY_COMMAND, {"velocity_command": 0.02}),
+    (JOINT_STATES, {"angle": 0.8}),
+    (PRESSURE_LIFTING, {"pressure_lifting": 1e7}),
+    (PRESSURE_LOWERING, {"pressure_lowering": 2e6}),
+)
+
+
+class Listener(Node):
+    """Hears commands and diagnostics, in the order in which they come."""
+
+    def __init__(self, *, lockstep: bool) -> None:
+        super().__init__("listener")
+        self.heard: list[tuple[str, float]] = []
+        self.said: list[tuple[str, bytes, str]] = []
+        self._profile = qos.offered(lockstep=lockstep)
+        for topic in (VELOCITY_COMMAND, VALVE_COMMAND):
+            self._hear(topic)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+
+    def _hear(self, topic: Topic) -> None:
+        def receive(message: Any) -> None:
+            (value,) = conversions.values(topic, message).values()
+            self.heard.append((topic.name, value))
+
+        kind = conversions.message_class(topic.type)
+        self.create_subscription(kind, topic.name, receive, self._profile)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.said += [(status.name, status.level, status.message) for status in message.status]
+
+    def publisher(self, topic: Topic) -> Any:
+        """Return a publisher of a topic as the graph's nodes have it."""
+        return self.create_publisher(
+            conversions.message_class(topic.type), topic.name, self._profile
+        )
+
+    def of(self, topic: Topic) -> list[float]:
+        """Return the values heard of a topic."""
+        return [value for name, value in self.heard if name == topic.name]
+
+    def complaints(self) -> list[str]:
+        """Return the errors said, each once, with the node that said it."""
+        return list(dict.fromkeys(f"{n}: {text}" for n, level, text in self.said if level == b"\2"))
+
+
+class Graph:
+    """Nodes in this process, spun while a condition is waited for."""
+
+    def __init__(self, nodes: list[Node], *, lockstep: bool = False) -> None:
+        self.listener = Listener(lockstep=lockstep)
+        self.nodes: list[Node] = []
+        self.executor = SingleThreadedExecutor()
+        for node in (self.listener, *nodes):
+            self.add(node)
+
+    def add(self, node: Node) -> None:
+        """Let a node join."""
+        self.nodes.append(node)
+        self.executor.add_node(node)
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Spin until the condition holds."""
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline, f"{what}; {self.listener.said}"
+            self.executor.spin_once(timeout_sec=0.02)
+            for node in self.nodes:
+                if isinstance(node, Shell):
+                    node.check()
+
+    def lose(self, node: Node) -> None:
+        """Let a node die."""
+        self.executor.remove_node(node)
+        node.destroy_node()
+        self.nodes.remove(node)
+
+
+@contextmanager
+def _graph(*makes: Callable[[], Node], lockstep: bool = False) -> Iterator[Graph]:
+    rclpy.init()
+    graph = Graph([make() for make in makes], lockstep=lockstep)
+    try:
+        yield graph
+    finally:
+        for node in graph.nodes:
+            node.destroy_node()
+        rclpy.shutdown()
+
+
+def _moves(graph: Graph) -> Callable[[], bool]:
+    return lambda: max(graph.listener.of(VALVE_COMMAND), default=0.0) > 0.3
+
+
+def test_a_killed_controller_shuts_the_valve_within_a_period_and_it_is_said() -> None:
+    command = [sys.executable, "-P", "-m", "emir_ros.cascade_node"]
+    with subprocess.Popen(command) as cascade, _graph(PlantNode, ForceLoopNode) as graph:
+        try:
+            there = graph.listener.count_subscribers
+            graph.until(lambda: there(CYLINDER_REFERENCE.name) > 0, "the controller is not there")
+            graph.add(TrajectoryNode(AT_ONCE))
+            graph.until(_moves(graph), "the machine does not move")
+        finally:
+            os.kill(cascade.pid, signal.SIGKILL)
+        cascade.wait()
+        heard = graph.listener.heard
+        graph.until(lambda: heard[-1] == (VALVE_COMMAND.name, 0.0), "the valve stays open")
+        last = max(k for k, (name, _) in enumerate(heard) if name == VELOCITY_COMMAND.name)
+        after = [value for _, value in heard[last + 1 :]]
+        # the period of the last command, and at most the one in which the next was due
+        assert sum(value != 0.0 for value in after) <= 2
+        said = "/force_loop_node: valve shut: no fresh velocity_command"
+        graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
+
+
+def test_a_controller_restarted_while_it_moves_takes_the_motion_up_again() -> None:
+    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
+    with _graph(*makes) as graph:
+        graph.until(_moves(graph), "the machine does not move")
+        graph.lose(graph.nodes[3])
+        graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] == 0.0, "the valve stays open")
+        graph.add(CascadeNode())
+        graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] > 0.3, "it does not go on")
+        heard = graph.listener.of(VALVE_COMMAND)
+        first = max(k for k, value in enumerate(heard) if value == 0.0)
+        assert heard[first + 1] < 1.0  # not at full stroke at once
+
+
+def test_a_dead_force_loop_shuts_the_valve_in_the_machine() -> None:
+    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
+    with _graph(*makes) as graph:
+        plant, force_loop = graph.nodes[1], graph.nodes[4]
+        assert isinstance(plant, PlantNode)
+        graph.until(_moves(graph), "the machine does not move")
+        graph.until(lambda: plant.truth.spool > 0.2, "the spool does not move")
+        graph.lose(force_loop)
+        graph.until(lambda: abs(plant.truth.spool) < 0.1, "the spool stays where it was")
+        said = "/plant_node: valve shut: no fresh valve_command"
+        graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
+
+
+def test_two_controllers_at_once_shut_the_valve_until_one_is_gone() -> None:
+    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode, PfcNode)
+    with _graph(*makes) as graph:
+        said = "/force_loop_node: valve shut: more than one node publishes velocity_command"
+        graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
+        graph.until(lambda: len(graph.listener.of(VALVE_COMMAND)) > 5, "no valve command")
+        assert not any(graph.listener.of(VALVE_COMMAND)[-5:])
+        graph.lose(graph.nodes[5])
+        graph.until(_moves(graph), "the machine does not move with one")
+
+
+def test_a_switch_by_parameter_while_it_moves_goes_without_a_jump() -> None:
+    chosen = ["--ros-args", "-p", "controllers:=[cascade, pfc]"]
+    with _graph(
+        PlantNode,
+        lambda: TrajectoryNode(AT_ONCE),
+        lambda: CascadeNode(STANDBY),
+        lambda: PfcNode(STANDBY),
+        lambda: SelectorNode(chosen),
+        ForceLoopNode,
+    ) as graph:
+        selector = graph.nodes[5]
+        graph.until(_moves(graph), "the machine does not move")
+        graph.until(lambda: graph.listener.of(VELOCITY_COMMAND)[-1] > 0.02, "it is slow")
+        (refused,) = selector.set_parameters([Parameter("controller", value="magic")])
+        assert not refused.successful
+        assert refused.reason == "selector_node: controller 'magic': running are cascade, pfc"
+        before = len(graph.listener.of(VELOCITY_COMMAND))
+        (done,) = selector.set_parameters([Parameter("controller", value="pfc")])
+        assert done.successful
+        graph.until(
+            lambda: (
+                any(text == "pfc drives the machine" for *_, text in graph.listener.said)
+                and len(graph.listener.of(VELOCITY_COMMAND)) > before + 3
+            ),
+            "nothing is said",
+        )
+        command = graph.listener.of(VELOCITY_COMMAND)[before - 2 : before + 3]
+        assert min(command) > 0.015
+        assert np.abs(np.diff(command)).max() < 0.006  # begun cold it falls by 0.02
+
+
+@pytest.mark.parametrize("bad", [name for _, (name,) in INPUTS])
+def test_a_number_that_is_none_shuts_the_valve_in_its_period(bad: str) -> None:
+    with _graph(lambda: ForceLoopNode(LOCKSTEP), lockstep=True) as graph:
+        for topic, signals in INPUTS:
+            publisher = graph.listener.publisher(topic)
+            for k in range(3):
+                given = dict.fromkeys(signals, math.nan) if k == 1 and bad in signals else signals
+                publisher.publish(conversions.message(topic, k * CONTROL_PERIOD_NS, given))
+        graph.until(lambda: len(graph.listener.of(VALVE_COMMAND)) == 3, "no valve command")
+        first, second, third = graph.listener.of(VALVE_COMMAND)
+        assert first > 0.0
+        assert second == 0.0
+        assert third > 0.0
+        said = f"/force_loop_node: valve shut: {bad} is not a number"
+        graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
+
+
+def test_a_command_that_comes_twice_ends_a_run_in_lock_step() -> None:
+    with _graph(lambda: ForceLoopNode(LOCKSTEP), lockstep=True) as graph:
+        publisher = graph.listener.publisher(VELOCITY_COMMAND)
+        for _ in range(2):
+            publisher.publish(conversions.message(VELOCITY_COMMAND, 0, {"velocity_command": 0.02}))
+        with pytest.raises(NodeError, match=r"velocity_command came twice for t = 0\.000 s"):
+            graph.until(lambda: False, "nothing is said")

@@ -134,6 +134,15 @@ def _there_are(path: str, known: Iterable[str]) -> str:
     return f"there are {', '.join(inside or dict.fromkeys(where for where, _, _ in names))}"
 
 
+def _of_plant_node(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the machine's groups where they stand as ROS 2 parameters of the plant node."""
+    for name in ("/**/plant_node", "plant_node"):
+        node = content.get(name)
+        if isinstance(node, dict) and isinstance(node.get("ros__parameters"), dict):
+            return dict(node["ros__parameters"])
+    return content
+
+
 def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the groups of parameters in a file by dotted path, each effect being one.
 

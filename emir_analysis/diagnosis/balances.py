@@ -11,7 +11,6 @@ bending          measured minus modelled tip deflection under the measured force
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +54,7 @@ BALANCES = {
 }
 LINKAGE = list(BALANCES).index("linkage")
 
+READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted signals
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend
 LAG_SMOOTHING = 0.05  # s, of pressures and deflection where a sensor's lag is undone
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
@@ -130,6 +130,23 @@ class Balances:
             result[k] = self._missing(modelled, true[k])
         return result
 
+    def one_step(self, machine: Machine) -> Array:
+        """Return measured minus predicted outputs, (n - 1, 4), SI units, one sample ahead.
+
+        From the measured state before, with what no sensor shows followed as for the balances.
+        The stroke goes on with the measured velocity, whatever the model.
+        """
+        result = np.full((self._experiment.angle.size - 1, len(OUTPUTS)), np.nan)
+        true = self._undistorted(machine)
+        for _, modelled in self._modelled([Plant(machine)], true[None], angle=SMOOTHED):
+            moved = self.velocity[:-1] * self._experiment.period
+            result[:, 0] = np.diff(self._experiment.outputs[:, 0]) - moved
+            result[:, 1] = np.diff(true[:, 1]) - np.diff(modelled.pressure_lifting)
+            result[:, 2] = np.diff(true[:, 2]) - np.diff(modelled.pressure_lowering)
+            result[:, 3] = (true[:, 3] - modelled.deflection)[1:]
+        result[:, np.isnan(self._experiment.outputs[0])] = np.nan
+        return result
+
     def _undistorted(self, machine: Machine) -> Array:
         """Return angle, p_H, p_S, deflection and the smoothed angle and rate, (n, 6).
 
@@ -151,13 +168,17 @@ class Balances:
                 smooth = [(smooth[0] - bias) / (1.0 + gain), smooth[1] / (1.0 + gain)]
         return np.column_stack([*columns, *smooth])
 
-    def _modelled(self, plants: Sequence[Plant], true: Array) -> list[tuple[int, Modelled]]:
+    def _modelled(
+        self, plants: Sequence[Plant], true: Array, angle: int = READ
+    ) -> list[tuple[int, Modelled]]:
         experiment = self._experiment
         starts = {}
         for k, plant in enumerate(plants):
             rest = true[k, : experiment.rest]
             try:
-                starts[k] = plant.initial(float(rest[:, 0].mean()), max(float(rest[:, 2].mean()), 0.0))
+                starts[k] = plant.initial(
+                    float(rest[:, 0].mean()), max(float(rest[:, 2].mean()), 0.0)
+                )
             except SimulationError:
                 continue
         if not starts:
@@ -172,7 +193,7 @@ class Balances:
             np.array(list(starts.values())),
             experiment.commands[::stride],
             COMMAND_STEP * stride,
-            np.ascontiguousarray(true[able][:, :, [1, 2, 4, 5, 0]]),
+            np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
             np.concatenate([plants[k].record for k in able]),
         )
         return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
@@ -242,7 +263,8 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
     noise and quantisation, and computing its balances with its own parameters.
     """
     ideal = free_runs([machine], experiment, [experiment.start()])[0]
-    return Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
+    left: Array = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
+    return left
 
 
 def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:

@@ -59,7 +59,9 @@ def train(evidence: Evidence) -> BlackBox:
             model = _fitted(heads, evidence, order, period)
             error = np.concatenate(
                 [
-                    ((model.free_run(e) - _shown(e, evidence)) / model.spread)[int(SHARE * len(e.angle)) :]
+                    ((model.free_run(e) - _shown(e, evidence)) / model.spread)[
+                        int(SHARE * len(e.angle)) :
+                    ]
                     for e in evidence.experiments
                 ]
             )

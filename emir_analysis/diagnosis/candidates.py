@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -181,7 +180,7 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
         machines = [machine] * len(points)
         return _free_run_errors(machines, early, evidence, starts.at(points))
 
-    none: NDArray[np.bool_] = np.zeros(2, dtype=bool)
+    none = np.zeros(2, dtype=bool)
     problem = Problem(model, np.zeros(2), -np.ones(2), np.ones(2), none)
     if not np.all(np.isfinite(model(np.zeros((1, 2))))):
         return starts.at(np.zeros((1, 2)))[0]

@@ -79,9 +79,7 @@ class Findings:
     shape: Shape | None
 
 
-def diagnose(
-    experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
-) -> Findings:
+def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
     """Find out from recordings of one machine what its data sheet lacks."""
     evidence = Evidence(experiments, sheet.machine)
     search = _Search(evidence, sheet, progress)

@@ -1,6 +1,6 @@
 """All recordings of one machine together: their balances and free runs in one vector each."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.balances import (
 )
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
 from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -45,7 +46,11 @@ class Evidence:
     @property
     def time(self) -> Array:
         """Middle of the balances' windows, (w,) s, one recording behind the other."""
-        return self._joined(lambda e, b: b.time)
+        parts, offset = [], 0.0
+        for experiment, balances in zip(self.experiments, self._balances, strict=True):
+            parts.append(balances.time + offset)
+            offset += float(experiment.time[-1])
+        return np.concatenate(parts)
 
     def behind(self, share: float) -> NDArray[np.bool_]:
         """Tell which windows lie behind the first part of their recording, (w,)."""
@@ -69,6 +74,16 @@ class Evidence:
         """Return what is missing in each balance, (m, w, 5), SI units."""
         return np.concatenate([b.residuals(machines) for b in self._balances], axis=1)
 
+    def one_step(self, machine: Machine) -> Array:
+        """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
+        return np.concatenate([balances.one_step(machine) for balances in self._balances])
+
+    def check_like(self, other: "Evidence") -> None:
+        """Raise InputError where these recordings lack a signal that others have."""
+        lacking = sorted(other.measured - self.measured)
+        if lacking:
+            raise InputError(f"{self.experiments[0].name}: no {lacking[0]}, which the others have")
+
     def floor(self, machine: Machine) -> Array:
         """Return the RMS, (5,), that the sensors of a machine alone leave in each balance.
 
@@ -78,10 +93,3 @@ class Evidence:
         floor = rms(left)
         floor[LINKAGE] = self.sensors[0]
         return floor
-
-    def _joined(self, signal: Callable[[Experiment, Balances], Array]) -> Array:
-        parts, offset = [], 0.0
-        for experiment, balances in zip(self.experiments, self._balances, strict=True):
-            parts.append(signal(experiment, balances) + offset)
-            offset += float(experiment.time[-1])
-        return np.concatenate(parts)

@@ -77,6 +77,16 @@ class Experiment:
         blind = np.array([name not in self.measured for name in OUTPUTS])
         return replace(self, angle=angle, outputs=np.where(blind, np.nan, outputs))
 
+    def under(self, commands: Array) -> "Experiment":
+        """Return a run from the same rest under other commands, (k,), without readings."""
+        samples = commands.size // self.every + 1
+        return replace(
+            self,
+            commands=commands[: (samples - 1) * self.every],
+            angle=np.full(samples, self.angle[: self.rest].mean()),
+            outputs=np.tile(self.outputs[: self.rest].mean(axis=0), (samples, 1)),
+        )
+
     def start(self) -> tuple[float, float]:
         """Return angle, rad, and p_S, Pa, at rest: the means of the first samples.
 
@@ -124,8 +134,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     commands = _held(recording[COMMAND], begin, every * (time.size - 1))
     rest = _rest(name, commands, period, machine)
     angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)
-    check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     check_motion(name, angle, machine)
+    check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
     measured = frozenset(shown) | {ANGLE}
@@ -137,7 +147,7 @@ def _angles(stroke: Array, machine: Machine) -> Array:
     p = record(machine)[0]
     angle = np.linspace(0.0, math.pi, 2000) - p["triangle_gamma0"]
     strokes = np.array([linkage.stroke(a, p) for a in angle])
-    return np.interp(stroke, strokes, angle)
+    return np.asarray(np.interp(stroke, strokes, angle))
 
 
 def noise(machine: Machine) -> Array:

@@ -75,4 +75,6 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     inverse = np.linalg.pinv(curvature.T @ curvature)
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
-    return Solution(np.asarray(result.x), inverse * excess, math.sqrt(2.0 * result.cost / result.fun.size))
+    return Solution(
+        np.asarray(result.x), inverse * excess, math.sqrt(2.0 * result.cost / result.fun.size)
+    )

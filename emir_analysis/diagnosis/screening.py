@@ -39,7 +39,9 @@ def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list
     """
     left = _Left(known, evidence, floor)
     others = [name for name in REGISTRY if name not in known.effects]
-    begun = [_Candidate(trial(sheet, (*known.effects, name), known), left, evidence) for name in others]
+    begun = [
+        _Candidate(trial(sheet, (*known.effects, name), known), left, evidence) for name in others
+    ]
     promising = sorted(begun, key=lambda c: c.expected)[:MOST_FITTED]
     return sorted((c.fitted() for c in promising), key=lambda s: s.cost)
 
@@ -65,13 +67,15 @@ class _Left:
 
     def force(self) -> Array:
         """Return the force that the known trial misses in the first recording, (w,) N."""
-        machine = self._known.machine
-        return self._evidence.residuals([machine])[0, : self._evidence.windows_of_first, 0]
+        missing: Array = self._evidence.residuals([self._known.machine])[0]
+        force: Array = missing[: self._evidence.windows_of_first, 0]
+        return force
 
     def step(self, final: Trial) -> Array:
         """Return the known parameters' best change, (k,), beside an effect."""
         residual = self._augmented([final])[0]
-        return -np.linalg.lstsq(self._triangle, self._basis.T @ residual, rcond=1e-9)[0]
+        step = np.linalg.lstsq(self._triangle, self._basis.T @ residual, rcond=1e-9)[0]
+        return np.asarray(-step)
 
     def _augmented(self, trials: list[Trial]) -> Array:
         missing = self._missing(trials)
@@ -164,8 +168,12 @@ def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evide
     size = (force[i : j + 1].mean() - (outside.mean() if outside.size else 0.0)) * at_tip
     loads.append((size, 0.0, 0.0, float(time[i]), float(time[j] - time[i])))
     return [
-        np.array([(v - u.origin) / u.scale if not u.logarithmic else np.log(v / u.origin)
-                  for u, v in zip(members, load, strict=True)])
+        np.array(
+            [
+                (v - u.origin) / u.scale if not u.logarithmic else np.log(v / u.origin)
+                for u, v in zip(members, load, strict=True)
+            ]
+        )
         for load in loads
     ]
 

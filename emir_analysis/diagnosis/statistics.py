@@ -8,7 +8,9 @@ from scipy.stats import chi2
 
 from emir_analysis.signals import Array
 
-BLOCK = 5.0  # s of a bootstrap's blocks: some periods of the slow mode, so that they are independent
+BLOCK = (
+    5.0  # s of a bootstrap's blocks: some periods of the slow mode, so that they are independent
+)
 DRAWS = 1000
 CONFIDENCE = 0.95
 LAG_STEP = 0.05  # s, between the lags of the tests: 14 and more in a period of the slow mode

@@ -59,7 +59,7 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     headings. Raises ParameterError, naming file and key and what is allowed, for a file that
     cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
-    content = read_map(path, what="parameters")
+    content = _of_plant_node(read_map(path, what="parameters"))
     base = content.pop(BASED_ON, None)
     if base is not None:
         content = _over(_base(path, base), content)

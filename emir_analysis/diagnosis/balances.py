@@ -10,6 +10,7 @@ linkage          measured stroke minus the linkage's stroke at the measured angl
 bending          measured minus modelled tip deflection under the measured force, rad
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -57,6 +58,7 @@ LINKAGE = list(BALANCES).index("linkage")
 READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted signals
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend
 LAG_SMOOTHING = 0.05  # s, of pressures and deflection where a sensor's lag is undone
+QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
@@ -214,6 +216,16 @@ class Balances:
                 self._mean(deflection - modelled.deflection),
             ]
         )
+
+
+def level(residual: Array) -> Array:
+    """Return the RMS of each column, (w, b) -> (b,), over the quieter 95 % of the windows.
+
+    In a few windows (a chamber at zero pressure, a logic block about to close) noise or a slight
+    error of a parameter makes far more than elsewhere; they would decide alone.
+    """
+    squares = np.sort(residual**2, axis=0)
+    return np.asarray(np.sqrt(np.mean(squares[: math.ceil(QUIETER * len(squares))], axis=0)))
 
 
 def available(measured: frozenset[str]) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import (
     Trial,
     fit_balances,
@@ -93,7 +93,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if final.effects:
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
     floor = evidence.floor(final.machine)
-    good = quiet(rms(after), floor) and explained(free_run_errors(final.machine, evidence))
+    good = quiet(level(after), floor) and explained(free_run_errors(final.machine, evidence))
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "unexplained":
         final, after = refitted, unaided
@@ -179,7 +179,7 @@ class _Search:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
 
     def _left(self, tried: Trial) -> Array:
-        return rms(self._evidence.residuals([tried.machine])[0])
+        return level(self._evidence.residuals([tried.machine])[0])
 
 
 def _free(tried: Tried) -> float:
@@ -199,7 +199,7 @@ def loudest(residual: Array, floor: Array) -> str | None:
 
     A missing force bends the boom too, so the bending counts only where nothing else speaks.
     """
-    loudness = dict(zip(BALANCES, rms(residual) / floor, strict=True))
+    loudness = dict(zip(BALANCES, level(residual) / floor, strict=True))
     loud = [name for name, ratio in loudness.items() if ratio > SPEAKS]
     first = [name for name in loud if name != "bending"]
     return max(first or loud, key=loudness.__getitem__, default=None)

@@ -10,10 +10,10 @@ from emir_analysis.diagnosis.balances import (
     LINKAGE,
     Balances,
     available,
+    level,
     noise_floor,
 )
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -85,11 +85,11 @@ class Evidence:
             raise InputError(f"{self.experiments[0].name}: no {lacking[0]}, which the others have")
 
     def floor(self, machine: Machine) -> Array:
-        """Return the RMS, (5,), that the sensors of a machine alone leave in each balance.
+        """Return the level, (5,), that the sensors of a machine alone leave in each balance.
 
         The linkage balance is exact: there it is the stroke's own noise.
         """
         left = np.concatenate([noise_floor(e, machine) for e in self.experiments])
-        floor = rms(left)
+        floor = level(left)
         floor[LINKAGE] = self.sensors[0]
         return floor

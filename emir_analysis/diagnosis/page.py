@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
     SHOWN,
@@ -104,7 +104,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             "The band is twice the sensors' noise.",
         ),
     ]
-    if not quiet(rms(findings.residuals["refitted"]), findings.floor):
+    if not quiet(level(findings.residuals["refitted"]), findings.floor):
         figure, name = shape_picture(findings)
         blocks.append(
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.diagnose import Findings
@@ -70,7 +70,7 @@ class CandidateResult:
 
 @dataclass(frozen=True)
 class BalanceResult:
-    """RMS over the windows; noise: the part that the sensors alone make."""
+    """RMS over the quieter 95 % of the windows; noise: the part that the sensors alone make."""
 
     unit: str
     noise: float
@@ -216,7 +216,7 @@ def _statement(findings: Findings) -> str:
     remainder = ""
     if speaking is not None and shape is not None:
         column = list(BALANCES).index(speaking)
-        size = rms(findings.residuals["after"])[column]
+        size = level(findings.residuals["after"])[column]
         noise_share = size / findings.floor[column]
         remainder = (
             f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
@@ -295,7 +295,7 @@ def _candidates(findings: Findings) -> tuple[CandidateResult, ...]:
 
 def _balances(findings: Findings) -> dict[str, BalanceResult]:
     """Return those balances that the signals allow."""
-    figures = [rms(findings.residuals[stage]) for stage in ("before", "refitted", "after")]
+    figures = [level(findings.residuals[stage]) for stage in ("before", "refitted", "after")]
     return {
         name: BalanceResult(balance.unit, float(findings.floor[k]), *(float(f[k]) for f in figures))
         for k, (name, balance) in enumerate(BALANCES.items())

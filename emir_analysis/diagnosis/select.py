@@ -30,7 +30,9 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     missing = (evidence.residuals([trial.machine])[0] / floor)[unseen][:, evidence.fitted]
     count = len(evidence.experiments)
     independent = (evidence.duration(1.0 - SEEN) - count * FORCE_WINDOW) / BLOCK
-    return score(np.mean(missing**2, axis=0), independent, trial.x.size)
+    # as the fit counts them: far above the noise by their size, so that no window decides alone
+    misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))
+    return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
 
 
 def free_run_score(trial: Trial, evidence: Evidence) -> float:
@@ -57,12 +59,12 @@ def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
     return [trials[best], *close]
 
 
-def quiet(rms: Array, floor: Array) -> bool:
-    """Tell whether no balance holds more than its noise; rms, floor: (b,).
+def quiet(left: Array, floor: Array) -> bool:
+    """Tell whether no balance holds more than its noise; left, floor: levels, (b,).
 
     NaN, a balance that the signals do not allow, is quiet.
     """
-    return not np.any(rms > SPEAKS * floor)
+    return not np.any(left > SPEAKS * floor)
 
 
 def explained(errors: list[Array]) -> bool:

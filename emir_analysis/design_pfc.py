@@ -105,7 +105,12 @@ def design_pfc(machine: Machine, task: DesignTask) -> PfcParameters:
     Raises SimulationError or ParameterError for a task that cannot be met.
     """
     output = OUTPUTS[task.controller]
-    model = design.reduced(velocity_model(machine, task.point, output), task.order)
+    return designed(design.reduced(velocity_model(machine, task.point, output), task.order), task)
+
+
+def designed(model: InternalModel, task: DesignTask) -> PfcParameters:
+    """Return the controller's parameters with an internal model of whatever origin."""
+    output = OUTPUTS[task.controller]
     if task.observer > 0.0:
         noise = design.Noise(task.observer, RESOLVER_STEP[output] / math.sqrt(12.0))
         model = design.with_observer(model, noise)

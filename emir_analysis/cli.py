@@ -192,6 +192,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
+    run_report.check_alike(runs)
     print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
     for file, write in (
         (options.json, run_report.write_json),

@@ -44,7 +44,8 @@ Values = dict[str, Any]
 
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
-OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
+# parameters of nodes, not controllers
+OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:

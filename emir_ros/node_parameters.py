@@ -1,6 +1,7 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -11,24 +12,37 @@ from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError, Quantity
 from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
+from emir_plant.robot.parameters import Robot
+from emir_plant.robot.sheet import robot
 
 Tree = TypeVar("Tree")
 
 
-def declare_tree(node: Node, tree: Tree) -> Tree:
+def declare_tree(node: Node, tree: Tree, without: str = "") -> Tree:
     """Declare every quantity of the dataclass as a ROS parameter; return it as then set.
 
-    Raises ParameterError, naming node and parameter, for a value that is out of range.
+    without: what the parameters' names leave out of the front of the quantities' paths. Raises
+    ParameterError, naming node and parameter, for a value that is out of range.
     """
     values = {}
     for path, (about, default) in declared(tree).items():
-        value = declare(node, path, default, describe(about))
+        value = declare(node, path.removeprefix(without), default, describe(about))
         if value != default:
             values[path] = value
     try:
         return with_values(tree, values)
     except ParameterError as error:
         raise ParameterError(f"{node.get_name()}: {error}") from None
+
+
+def declare_robot(node: Node) -> Robot:
+    """Declare the files of the robot's sheet and return what they say.
+
+    Raises ParameterError, naming file and key.
+    """
+    main = declare(node, "machine_file", "", "YAML of the main joint; empty: EMIR's joint 1")
+    file = declare(node, "robot_file", "", "YAML of the robot beyond that; empty: EMIR")
+    return robot(Path(file) if file else None, Path(main) if main else None)
 
 
 def declare_pfc(node: Node, output: str) -> PfcParameters:

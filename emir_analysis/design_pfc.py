@@ -241,6 +241,9 @@ def picture(found: StabilityMap) -> Figure:
         axis.set_title("lifting" if velocity > 0.0 else "lowering")
         for (row, column), value in np.ndenumerate(table):
             if not math.isnan(value):
-                axis.text(column, row, f"{value:.4f}", ha="center", va="center", color="k")
+                axis.text(
+                    column, row, f"{value:.4f}", ha="center", va="center", color="k",
+                    fontsize=26.0 / len(found.angles) ** 0.7,
+                )  # fmt: skip
     figure.colorbar(image, ax=list(axes), label="spectral radius")
     return figure

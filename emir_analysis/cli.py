@@ -26,6 +26,7 @@ USAGE = """usage: emir COMMAND ...
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  urdf       the whole robot as URDF
   blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "urdf": _urdf,
         "blind": _blind,
         "bench": _bench,
     }
@@ -348,6 +350,13 @@ def _blind(words: list[str]) -> int:
     from emir_analysis.blind.command import arguments, command
 
     print(command(arguments(words), _progress))
+    return 0
+
+
+def _urdf(words: list[str]) -> int:
+    from emir_analysis.urdf_command import command, parser
+
+    print(command(parser().parse_args(words)))
     return 0
 
 

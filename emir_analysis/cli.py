@@ -280,11 +280,16 @@ def _design(words: list[str]) -> int:
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
         return _hand_over("emir_ros.bench", words[1:])
+    if words[:1] == ["diagnosis"]:
+        from emir_analysis.bench import identification
+
+        identification.command(words[1:], print)
+        return 0
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
     from emir_analysis.bench.command import PARTS, command
 
     parser = argparse.ArgumentParser(prog="emir bench")
-    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument("what", choices=(*PARTS, "graph", "diagnosis"))
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
     )

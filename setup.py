@@ -29,6 +29,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", matching("emir_ros/launch/*.launch.py")),
         (f"share/{NAME}/config", matching("emir_ros/config/*.yaml")),
+        (f"share/{NAME}/layouts", matching("emir_ros/layouts/*")),
         (f"lib/{NAME}", matching("emir_ros/executables/*_node")),
     ],
     entry_points={"console_scripts": ["emir = emir_analysis.cli:main"]},
@@ -63,6 +64,10 @@ setup(
             "pytest-timeout>=2.3",
             "rosbags>=0.10",
         ],
+        # What `emir bench diagnosis` stands beside; these hold numpy back (an environment apart).
+        "identification": ["pysindy>=2.1", "sysidentpy>=0.9"],
+        # What `emir bench` stands beside; what is missing, it says.
+        "bench": ["do-mpc>=5.0", "mujoco>=3.2", "osqp>=1.0", "rosbags>=0.10"],
         # What ruff and mypy report changes with every minor release: raise them on purpose.
         "lint": [
             "mypy~=2.4.1",

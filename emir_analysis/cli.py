@@ -26,6 +26,7 @@ USAGE = """usage: emir COMMAND ...
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  urdf       the whole robot as URDF
   blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "urdf": _urdf,
         "blind": _blind,
         "bench": _bench,
     }
@@ -192,6 +194,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
+    run_report.check_alike(runs)
     print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
     for file, write in (
         (options.json, run_report.write_json),
@@ -206,15 +209,25 @@ def _analyze(words: list[str]) -> int:
 def _compare(words: list[str]) -> int:
     from emir_analysis.compare_command import command
 
-    parser = argparse.ArgumentParser(prog="emir compare")
-    parser.add_argument("--angle", type=float, nargs="+", default=[45.0], metavar="DEG")
-    parser.add_argument("--payload", type=float, nargs="+", default=[0.0], metavar="KG")
+    about = (
+        "Every controller over a grid of posture, payload, size of the move and model error;"
+        " what is named is varied, the rest then stays as usual; of one case, its curves."
+    )
+    parser = argparse.ArgumentParser(prog="emir compare", description=about)
+    parser.add_argument("--angle", type=float, nargs="+", metavar="DEG", help="of the boom")
+    parser.add_argument("--payload", type=float, nargs="+", metavar="KG", help="not told to them")
+    parser.add_argument("--size", type=float, nargs="+", metavar="MM", help="of the move")
+    parser.add_argument(
+        "--error", nargs="+", metavar="NAME", help="model errors: none, 'oil -20%%', ..."
+    )
     parser.add_argument("--trajectory", default="lift-lower", help="lift-lower or lower-lift")
     parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="mean and deviation")
     parser.add_argument("--pfc", type=Path, metavar="FILE", help="made by emir design")
     parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="velocity and deflection")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
+    parser.add_argument("--trade-off", action="store_true", help="instead: cascade over k_p and T")
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
@@ -241,16 +254,22 @@ def _design(words: list[str]) -> int:
 
     parser = argparse.ArgumentParser(prog="emir design")
     parser.add_argument(
-        "--from", dest="machine", metavar="MODEL", default="joint1",
-        help="YAML of the machine; default: EMIR's joint 1",
+        "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
+        help="YAML of the machine or recording of a run; default: EMIR's joint 1",
     )  # fmt: skip
     parser.add_argument("--controller", default="pfc", help="pfc (default) or pfc_tip")
-    parser.add_argument("--order", type=int, help="of the internal model; default 6, tip 8")
+    parser.add_argument(
+        "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
+    )
     parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
     parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
     parser.add_argument(
         "--observer", type=float, default=0.0, metavar="M/S",
         help="Kalman filter in place of an independent model: unknown input's change per sample",
+    )  # fmt: skip
+    parser.add_argument(
+        "--schedule", action="store_true",
+        help="models over posture and payload, which the controller reads off the static force",
     )  # fmt: skip
     parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
@@ -263,11 +282,16 @@ def _design(words: list[str]) -> int:
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
         return _hand_over("emir_ros.bench", words[1:])
+    if words[:1] == ["diagnosis"]:
+        from emir_analysis.bench import identification
+
+        identification.command(words[1:], print)
+        return 0
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
     from emir_analysis.bench.command import PARTS, command
 
     parser = argparse.ArgumentParser(prog="emir bench")
-    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument("what", choices=(*PARTS, "graph", "diagnosis"))
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
     )
@@ -279,7 +303,7 @@ def _bench(words: list[str]) -> int:
 def _linearize(words: list[str]) -> int:
     from emir_analysis.linearize_command import command
 
-    print(command(words))
+    print(command(words, _progress))
     return 0
 
 
@@ -302,7 +326,8 @@ def _figures(words: list[str]) -> int:
 
 
 def _diagnose(words: list[str]) -> int:
-    from emir_analysis.diagnosis import command, summary
+    from emir_analysis.diagnosis import actuator, command, summary
+    from emir_plant.actuator import is_actuator
 
     parser = argparse.ArgumentParser(prog="emir diagnose")
     parser.add_argument("bag", type=Path, nargs="+", help="recordings to find out from")
@@ -322,6 +347,19 @@ def _diagnose(words: list[str]) -> int:
         "--predictions", type=Path, metavar="DIR", help="write the simulated runs as MCAP"
     )
     o = parser.parse_args(words)
+    if is_actuator(o.datasheet):
+        judges = o.judge or [None]
+        if len(o.bag) > 1 or len(judges) > 1 or o.model_out or o.predictions:
+            raise InputError(
+                f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one;"
+                " there is no --model-out and no --predictions for it"
+            )
+        found = actuator.command(
+            o.bag[0], o.datasheet, o.signals, judges[0],
+            json=o.json, html=o.html, progress=_progress,
+        )  # fmt: skip
+        print(actuator.summary(found))
+        return 0
     diagnosis = command(
         o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
         model_out=o.model_out, predictions=o.predictions,
@@ -334,6 +372,13 @@ def _blind(words: list[str]) -> int:
     from emir_analysis.blind.command import arguments, command
 
     print(command(arguments(words), _progress))
+    return 0
+
+
+def _urdf(words: list[str]) -> int:
+    from emir_analysis.urdf_command import command, parser
+
+    print(command(parser().parse_args(words)))
     return 0
 
 

@@ -21,6 +21,7 @@ from emir_analysis.node_controls import (
     TrajectoryControl,
 )
 from emir_analysis.replay_plant import replay_plant
+from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_analysis.switching import Ready
@@ -29,9 +30,11 @@ from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
-from emir_control.pfc import Pfc, PfcParameters
+from emir_control.pfc import PfcParameters
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
@@ -43,7 +46,8 @@ Values = dict[str, Any]
 
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
-OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
+# parameters of nodes, not controllers
+OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -55,9 +59,11 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
+    about = bags.metadata(bag).get("emir", {})
+    if full_name(TCP_POSE, bags.recorded_topics(bag)):
+        return replay_robot(bag, node, {**_recorded_parameters(bag, node, about), **changed})
     if node == PLANT:
         return replay_plant(bag, changed)
-    about = bags.metadata(bag).get("emir", {})
     control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
     law: Stepping = control
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
@@ -116,9 +122,9 @@ def _control(node: str, values: Values) -> NodeControl:
         if node == "force_loop":
             return ForceLoopControl(ForceLoop(with_values(ForceLoopParameters(), values)))
         if node == "pfc":
-            return PfcControl(Pfc(_design(pfc_file.STROKE, values)))
+            return PfcControl(law_of(_design(pfc_file.STROKE, values)))
         if node == "pfc_tip":
-            return PfcTipControl(Tip(Pfc(_design(pfc_file.TIP_ANGLE, values))))
+            return PfcTipControl(Tip(law_of(_design(pfc_file.TIP_ANGLE, values))))
         name = values.pop("trajectory", "lift-lower")
         return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
     except ParameterError as error:
@@ -126,7 +132,6 @@ def _control(node: str, values: Values) -> NodeControl:
 
 
 def _design(output: str, values: Values) -> PfcParameters:
-    file = values.pop("model_file", "")
-    design = pfc_file.load(Path(str(file)) if file else pfc_file.default_file(output), output)
+    design = pfc_file.load(pfc_file.find(str(values.pop("model_file", "")), output), output)
     words = {name: values.pop(name) for name in ("form", "future") if name in values}
     return with_values(replace(design, **words), values)

@@ -349,14 +349,13 @@ def _diagnose(words: list[str]) -> int:
     o = parser.parse_args(words)
     if is_actuator(o.datasheet):
         judges = o.judge or [None]
-        if len(o.bag) > 1 or len(judges) > 1 or o.model_out or o.predictions:
+        if len(o.bag) > 1 or len(judges) > 1:
             raise InputError(
-                f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one;"
-                " there is no --model-out and no --predictions for it"
+                f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one"
             )
         found = actuator.command(
-            o.bag[0], o.datasheet, o.signals, judges[0],
-            json=o.json, html=o.html, progress=_progress,
+            o.bag[0], o.datasheet, o.signals, judges[0], json=o.json, html=o.html,
+            model_out=o.model_out, predictions=o.predictions, progress=_progress,
         )  # fmt: skip
         print(actuator.summary(found))
         return 0

@@ -39,12 +39,17 @@ def _write_inertia(k: int, axes: Array, place: Array, t: Tree, inertia: Array) -
         for j in range(3):
             c[i] += axes[i, j] * t.centres[k, j]
     square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    half = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            half[i, j] = 0.0
+            for a in range(3):
+                half[i, j] += axes[i, a] * t.inertias[k, a, j]
     for i in range(3):
         for j in range(3):
             total = 0.0
             for a in range(3):
-                for b in range(3):
-                    total += axes[i, a] * t.inertias[k, a, b] * axes[j, b]
+                total += half[i, a] * axes[j, a]
             inertia[3 + i, 3 + j] = total - m * c[i] * c[j]
             inertia[i, j] = 0.0
             inertia[i, 3 + j] = 0.0
@@ -86,9 +91,9 @@ def factorized(z: Array, slopes: Array, added: Array, t: Tree) -> Factors:
             motions[at] = tree_motions[t.coordinates[k] + f]
             pivots[at] = _pivot(outside, motions[at], moved, momenta[at]) + added[at] + square
             for i in range(6):
+                share = momenta[at, i] / pivots[at]
                 for j in range(6):
-                    taken = momenta[at, i] * momenta[at, j] / pivots[at]
-                    outside[i, j] += hanging[i, j] - taken
+                    outside[i, j] += hanging[i, j] - share * momenta[at, j]
     return Factors(motions, momenta, pivots)
 
 

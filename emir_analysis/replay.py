@@ -29,7 +29,8 @@ from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
-from emir_control.pfc import Pfc, PfcParameters
+from emir_control.pfc import PfcParameters
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.topics import (
@@ -43,7 +44,8 @@ Values = dict[str, Any]
 
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
-OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
+# parameters of nodes, not controllers
+OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -116,9 +118,9 @@ def _control(node: str, values: Values) -> NodeControl:
         if node == "force_loop":
             return ForceLoopControl(ForceLoop(with_values(ForceLoopParameters(), values)))
         if node == "pfc":
-            return PfcControl(Pfc(_design(pfc_file.STROKE, values)))
+            return PfcControl(law_of(_design(pfc_file.STROKE, values)))
         if node == "pfc_tip":
-            return PfcTipControl(Tip(Pfc(_design(pfc_file.TIP_ANGLE, values))))
+            return PfcTipControl(Tip(law_of(_design(pfc_file.TIP_ANGLE, values))))
         name = values.pop("trajectory", "lift-lower")
         return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
     except ParameterError as error:
@@ -126,7 +128,6 @@ def _control(node: str, values: Values) -> NodeControl:
 
 
 def _design(output: str, values: Values) -> PfcParameters:
-    file = values.pop("model_file", "")
-    design = pfc_file.load(Path(str(file)) if file else pfc_file.default_file(output), output)
+    design = pfc_file.load(pfc_file.find(str(values.pop("model_file", "")), output), output)
     words = {name: values.pop(name) for name in ("form", "future") if name in values}
     return with_values(replace(design, **words), values)

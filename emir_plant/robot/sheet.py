@@ -14,12 +14,17 @@ from emir_common.quantity import ParameterError, quantities
 from emir_common.yaml_file import read_map
 from emir_plant.parameters import Machine
 from emir_plant.robot.parameters import Robot
-from emir_plant.sheet import EFFECTS, joint1
+from emir_plant.sheet import EFFECTS, joint1, load_sheet
 
 
-def robot() -> Robot:
-    """Return the robot as the project states it (data/robot.yaml and data/joint1.yaml)."""
-    return load_robot(Path(str(files("emir_plant") / "data" / "robot.yaml")), joint1())
+def robot(file: Path | None = None, main: Path | None = None) -> Robot:
+    """Return the robot of two files, its own and its main joint's.
+
+    Without them it is EMIR as the project states it (data/robot.yaml and data/joint1.yaml).
+    Raises ParameterError as `load_robot` and `load_sheet`.
+    """
+    own = file or Path(str(files("emir_plant") / "data" / "robot.yaml"))
+    return load_robot(own, load_sheet(main).machine if main else joint1())
 
 
 def load_robot(path: Path, main: Machine) -> Robot:

@@ -26,6 +26,7 @@ USAGE = """usage: emir COMMAND ...
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  urdf       the whole robot as URDF
   blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "urdf": _urdf,
         "blind": _blind,
         "bench": _bench,
     }
@@ -278,11 +280,16 @@ def _design(words: list[str]) -> int:
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
         return _hand_over("emir_ros.bench", words[1:])
+    if words[:1] == ["diagnosis"]:
+        from emir_analysis.bench import identification
+
+        identification.command(words[1:], print)
+        return 0
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
     from emir_analysis.bench.command import PARTS, command
 
     parser = argparse.ArgumentParser(prog="emir bench")
-    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument("what", choices=(*PARTS, "graph", "diagnosis"))
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
     )
@@ -343,6 +350,13 @@ def _blind(words: list[str]) -> int:
     from emir_analysis.blind.command import arguments, command
 
     print(command(arguments(words), _progress))
+    return 0
+
+
+def _urdf(words: list[str]) -> int:
+    from emir_analysis.urdf_command import command, parser
+
+    print(command(parser().parse_args(words)))
     return 0
 
 

@@ -36,7 +36,7 @@ COLORS = ("#5d4037", "#0b6bb5", "#d1622b", "#2e8b57", "#8e44ad", "#b8860b")
 POINTS = 51  # along the arms
 
 # Any: mypy wants the fields spelled out; these are those of the topic table.
-named_tuple: Any = namedtuple
+named_tuple: Any = namedtuple  # noqa: PYI024 (fields by the topic table)
 RobotFrame: Any = named_tuple("RobotFrame", ("time", *SIGNALS, *ERRORS))
 
 

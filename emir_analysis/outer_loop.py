@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
+from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import NO_MOVE, Move, Reference
 from emir_plant.sensors import Measurement
@@ -67,6 +68,19 @@ class PfcTipLoop:
         inputs = TipInputs(now.reference, now.preview, now.reading.angle, now.reading.deflection)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc_tip", outputs)
+
+
+@dataclass(frozen=True)
+class ShapedLoop:
+    """Conventional control of a shaped reference."""
+
+    shaped: ShapedCascade
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        inputs = ShapedInputs(now.reference, now.move, now.reading.stroke, now.reading.force)
+        state, outputs = self.shaped.step(state or self.shaped.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
 
 
 @dataclass(frozen=True)

@@ -47,12 +47,15 @@ setup(
         "ros": ["ros-jazzy-common-interfaces==5.3.6", "ros-jazzy-rclpy[fastrtps]==7.1.6"],
         # The whole robot's mechanics; the main joint does without.
         "robot": ["pin>=4.1"],
+        # The blind test on the machines of a Dask cluster.
+        "cluster": ["distributed>=2024.8"],
         # Linear models as python-control systems: emir linearize.
         "design": ["control>=0.10"],
         # `emir view`: the page in the browser.
         "view": ["viser>=1.1"],
         "test": [
             "control>=0.10",
+            "distributed>=2024.8",
             "mujoco>=3.2",
             "pandas>=2.2",
             "playwright>=1.40",

@@ -26,6 +26,7 @@ USAGE = """usage: emir COMMAND ...
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
 `emir COMMAND --help` tells more."""
@@ -49,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "blind": _blind,
         "bench": _bench,
     }
     if not words or words[0] in ("-h", "--help"):
@@ -312,6 +314,13 @@ def _diagnose(words: list[str]) -> int:
     o = parser.parse_args(words)
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
+    return 0
+
+
+def _blind(words: list[str]) -> int:
+    from emir_analysis.blind.command import arguments, command
+
+    print(command(arguments(words), _progress))
     return 0
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
@@ -39,11 +40,11 @@ class Trapezoid:
     speed: float
     ramp: float
 
-    @property
+    @cached_property
     def _ramp_time(self) -> float:
         return min(self.ramp, math.sqrt(abs(self.distance) * self.ramp / self.speed))
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Return the time of the whole move, s."""
         if self.distance == 0.0:
@@ -110,7 +111,7 @@ class AwayAndBack:
         p = self.parameters
         return p.delay + 2.0 * (self._move.duration + p.pause)
 
-    @property
+    @cached_property
     def _move(self) -> Trapezoid:
         p = self.parameters
         return Trapezoid(p.distance, p.speed, p.ramp)

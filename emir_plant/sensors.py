@@ -86,7 +86,7 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
     lowering = shown["pressure_lowering"] + sensors.pressure_noise * noise[1]
     return Measurement(
         angle=angle,
-        stroke=linkage.stroke(angle, plant.record[0]),
+        stroke=_stroke(angle, plant.record),
         pressure_lifting=lifting,
         pressure_lowering=lowering,
         force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
@@ -147,8 +147,13 @@ def _lagged(signal: Array, lag: float, period: float) -> Array:
 
 
 @compiled
+def _stroke(angle: float, parameters: NDArray[Any]) -> float:
+    return linkage.stroke(angle, parameters[0])
+
+
+@compiled
 def _strokes(angles: Array, parameters: NDArray[Any]) -> Array:
     result = np.empty_like(angles)
     for k in range(angles.size):
-        result[k] = linkage.stroke(angles[k], parameters[0])
+        result[k] = _stroke(angles[k], parameters)
     return result

@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -34,6 +33,7 @@ from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
+from emir_ros.wire import Wire, stamp_ns
 
 OUTPUTS = [
     JOINT_STATES,
@@ -88,7 +88,8 @@ class PlantNode(Shell):
         self._recorded = -1
         profile = qos.requested(VALVE_COMMAND, lockstep=self.lockstep)
         kind = conversions.message_class(VALVE_COMMAND.type)
-        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile)
+        self._command_wire = Wire(VALVE_COMMAND)
+        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile, raw=True)
         if self.lockstep:
             self._start_lockstep()
         else:
@@ -193,14 +194,14 @@ class PlantNode(Shell):
             return 0.0
         return self._command[1]
 
-    def _on_command(self, message: Any) -> None:
-        command = conversions.values(VALVE_COMMAND, message)["valve_command"]
+    def _on_command(self, data: bytes) -> None:
+        command = self._command_wire.decode(data)["valve_command"]
         if not math.isfinite(command):
             self.diagnostics.say(Level.ERROR, f"valve shut: {VALVE_COMMAND.name} is {command}")
             command = 0.0
         else:
             self.diagnostics.say(Level.OK, "running")
-        self._command = (conversions.stamp_ns(message), command)
+        self._command = (stamp_ns(data), command)
         self._command_received = time.monotonic()
         if self.lockstep:
             self._advance_when_answered()

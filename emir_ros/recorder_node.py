@@ -9,7 +9,6 @@ clock otherwise), so a recorder that is killed outright loses no more than that.
 
 import json
 import math
-import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,12 +39,11 @@ from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.shell import NodeError, Shell
+from emir_ros.wire import stamp_ns
 
 PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
-
-CDR_STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
 
 
 class RecorderNode(Shell):
@@ -61,6 +59,8 @@ class RecorderNode(Shell):
         writer = self._make_writer(folder)
         reject_unknown(self)
         self._topics = [_known(name) for name in names]
+        self._plant_topics = [topic for topic in self._topics if topic.every == "plant"]
+        self._full_names = {name: self.resolve_topic_name(name) for name in names}
         self._writer = writer()
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
@@ -125,15 +125,14 @@ class RecorderNode(Shell):
             self._writer.flush()
 
     def _record(self, topic: Topic) -> None:
-        full_name = self.resolve_topic_name(topic.name)
+        full_name = self._full_names[topic.name]
         profile = qos.offered(lockstep=self.lockstep)
         about = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
         self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive(data: bytes) -> None:
-            sec, nanosec = CDR_STAMP.unpack_from(data)
-            stamp = sec * conversions.NANOSECONDS + nanosec
+            stamp = stamp_ns(data)
             if self.lockstep:
                 self._on_stamp(topic, stamp, data)
             else:
@@ -156,15 +155,14 @@ class RecorderNode(Shell):
             self._next += PLANT_PERIOD_NS
 
     def _is_complete(self, stamp: int) -> bool:
-        controlled = stamp % CONTROL_PERIOD_NS == 0
-        expected = sum(controlled or topic.every == "plant" for topic in self._topics)
-        return len(self._pending.get(stamp, ())) == expected
+        expected = self._topics if stamp % CONTROL_PERIOD_NS == 0 else self._plant_topics
+        return len(self._pending.get(stamp, ())) == len(expected)
 
     def _write_stamp(self, stamp: int) -> None:
         messages = self._pending.pop(stamp)
         for topic in self._topics:
             if topic.name in messages:
-                full_name = self.resolve_topic_name(topic.name)
+                full_name = self._full_names[topic.name]
                 self._write(full_name, messages[topic.name], stamp, stamp)
 
     def _describe(self, answers: dict[str, dict[str, Any]]) -> None:

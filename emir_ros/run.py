@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         check(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
-    code = _run(plan, options.processes)
+    code = run_plan(plan, options.processes)
     if plan.bag.is_dir():  # what there is, however it ended
         shown = _show(plan.bag)
         code = code or shown
@@ -76,8 +76,11 @@ def _switch(words: str) -> Switch:
         raise ParameterError(f"--switch {words}: not of the form S=NAME") from None
 
 
-def _run(plan: Plan, processes: str) -> int:
-    """Return the exit code; the recording is closed when this returns."""
+def run_plan(plan: Plan, processes: str) -> int:
+    """Run the graph in `one` process or in `many`; returns the exit code.
+
+    The recording is closed when this returns.
+    """
     try:
         with ros_arguments(plan) as ros:
             if processes == "one":

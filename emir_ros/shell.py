@@ -28,6 +28,7 @@ from emir_plant.plant import SimulationError
 from emir_ros import qos
 from emir_ros.diagnostics import Diagnostics, Level
 from emir_ros.node_parameters import declare
+from emir_ros.wire import Wire, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.time import Time
@@ -52,13 +53,14 @@ class Shell(Node):
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
-        self._outputs: dict[str, tuple[Topic, Any]] = {}
+        self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
         self._offer(outputs)
         self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
         for topic in outputs:
-            self._outputs[topic.name] = (topic, self._publisher(topic.type, topic.name))
+            publisher = self._publisher(topic.type, topic.name)
+            self._outputs[topic.name] = (topic, Wire(topic), publisher)
 
     def _publisher(self, type_name: str, name: str) -> Any:
         kind = conversions.message_class(type_name)
@@ -66,8 +68,8 @@ class Shell(Node):
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
-        publisher = self._outputs[topic.name][1]
-        publisher.publish(conversions.message(topic, stamp, signals))
+        _, wire, publisher = self._outputs[topic.name]
+        publisher.publish(wire.encode(stamp, signals))
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
@@ -183,20 +185,19 @@ class ControlNode(Shell):
         """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
         self._inputs[topic.name] = topic
 
-        def receive(message: Any) -> None:
-            signals = conversions.values(topic, message)
-            if self.lockstep:
-                self._on_stamp(topic, conversions.stamp_ns(message) + later, signals)
-            else:
-                self._latest[topic.name] = (self.get_clock().now(), signals)
+        wire = Wire(topic)
+
+        def receive(data: bytes) -> None:
+            if not self.lockstep:
+                self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
+            elif stamp_ns(data) % CONTROL_PERIOD_NS == 0:
+                self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
 
         kind = conversions.message_class(topic.type)
         profile = qos.requested(topic, lockstep=self.lockstep)
-        self.create_subscription(kind, topic.name, receive, profile)
+        self.create_subscription(kind, topic.name, receive, profile, raw=True)
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
-        if stamp % CONTROL_PERIOD_NS:
-            return
         complete = self._pending.setdefault(stamp, {})
         if topic.name in complete or stamp <= self._last_stamp:
             raise NodeError(
@@ -261,5 +262,5 @@ class ControlNode(Shell):
         return "running"
 
     def _publish_all(self, stamp: int, signals: Signals) -> None:
-        for topic, _ in self._outputs.values():
+        for topic, _, _ in self._outputs.values():
             self.publish(topic, stamp, signals)

@@ -1,0 +1,148 @@
+"""What is put into machine number k of a seed: one effect, two, none or a foreign one."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from emir_analysis.blind.hidden import CATALOGUE, Hidden, Random
+from emir_analysis.blind.machine import Array, Machine, Sizes
+from emir_analysis.blind.numbers import Numbers, Stated
+from emir_analysis.blind.operator import Operator
+from emir_analysis.blind.recording import Run, Start, operated, repeated, spread_of_strokes
+
+Effects = tuple[type[Hidden], ...]
+
+KINDS = ("one", "none", "one", "two", "one", "foreign")  # in turn
+MATTERS = 0.05  # of a signal's standard deviation: the least RMS that effects have to make
+STRONGER = 1.6  # times, where they make less
+ATTEMPTS = 4  # to make them matter, before others are drawn
+PROBE = 25.0  # s of a run, over which it is found out whether they do
+
+
+@dataclass(frozen=True)
+class Puzzle:
+    """A machine with what is hidden in it, and its two recordings.
+
+    hidden: names. kind: of KINDS. size: RMS that the hidden makes in the signal that it changes
+    most, as a share of that signal's standard deviation. learn, judge: the runs.
+    """
+
+    machine: Machine
+    kind: str
+    hidden: tuple[str, ...]
+    size: float
+    learn: Run
+    judge: Run
+
+
+def puzzle(  # noqa: PLR0913, PLR0917 (what a machine is made of, one by one)
+    stated: Stated,
+    seed: int,
+    number: int,
+    foreign: Effects,
+    duration: float,
+    only: tuple[str, ...] = (),
+) -> Puzzle:
+    """Build machine `number` of a seed and let it move for twice `duration`, s.
+
+    foreign: what no catalogue holds; without any, no machine has it. only: effects from which to
+    draw, all when empty. Equal arguments give equal machines.
+    """
+    random = np.random.default_rng((seed, number))
+    numbers = stated.built(random)
+    start = Start(random.uniform(0.7, 0.87), random.uniform(15e5, 35e5))
+    machine, size, tried = None, 0.0, 0
+    while machine is None:
+        effects = hidden_in(seed, number, foreign, only, tried)
+        machine, size = _that_matters(effects, numbers, start, stated, random)
+        tried += 1
+    runs = [
+        operated(machine, start, _operator(random, stated, abrupt=abrupt), duration)
+        for abrupt in (False, True)
+    ]
+    names = tuple(effect.name for effect in effects)
+    return Puzzle(machine, kind_of(number, foreign), names, size, *runs)
+
+
+def kind_of(number: int, foreign: Effects) -> str:
+    """Return the kind of machine `number`."""
+    kind = KINDS[number % len(KINDS)]
+    return "none" if kind == "foreign" and not foreign else kind
+
+
+def hidden_in(
+    seed: int, number: int, foreign: Effects, only: tuple[str, ...] = (), tried: int = 0
+) -> Effects:
+    """Draw what is hidden in machine `number`; every effect has its turn before the next round.
+
+    tried: how often before it was drawn in vain.
+    """
+    kind = kind_of(number, foreign)
+    if kind == "none":
+        return ()
+    of_kind = foreign if kind == "foreign" else CATALOGUE
+    catalogue = tuple(e for e in of_kind if e.name in only) or of_kind
+    if kind == "two" or tried:
+        random = np.random.default_rng((seed, number, tried))
+        count = min(2 if kind == "two" else 1, len(catalogue))
+        drawn = random.choice(len(catalogue), count, replace=False)
+        return tuple(catalogue[k] for k in drawn)
+    turn = sum(KINDS[k % len(KINDS)] == kind for k in range(number))
+    turn_of_all, place = divmod(turn, len(catalogue))
+    order = np.random.default_rng((seed, KINDS.index(kind), turn_of_all))
+    return (catalogue[order.permutation(len(catalogue))[place]],)
+
+
+def _operator(random: Random, stated: Stated, *, abrupt: bool) -> Operator:
+    strokes = spread_of_strokes(stated.numbers)
+    return Operator(random, stated.numbers, strokes, abrupt=abrupt)
+
+
+def _that_matters(
+    effects: Effects,
+    numbers: Numbers,
+    start: Start,
+    stated: Stated,
+    random: Random,
+) -> tuple[Machine | None, float]:
+    """Return a machine whose effects each make a difference, and the least difference."""
+    if not effects:
+        return Machine(numbers), 0.0
+    sizes: Sizes = {}
+    least = np.inf
+    for effect in effects:
+        own, size = _large_enough(effect, numbers, start, stated, random)
+        if own is None:
+            return None, 0.0
+        sizes |= own
+        least = min(least, size)
+    kind: Any = type("Machine", effects, {}) if len(effects) > 1 else effects[0]
+    return kind(numbers, sizes), float(least)
+
+
+def _large_enough(
+    effect: type[Hidden], numbers: Numbers, start: Start, stated: Stated, random: Random
+) -> tuple[Sizes | None, float]:
+    sizes = effect.draw(random)
+    seed = int(random.integers(2**31))
+    for _ in range(ATTEMPTS):
+        operator = _operator(np.random.default_rng(seed), stated, abrupt=True)
+        with_it = operated(effect(numbers, sizes), start, operator, PROBE)
+        without = repeated(Machine(numbers), start, with_it.commands)
+        made = difference(with_it, without)
+        if made >= MATTERS:
+            return sizes, made
+        sizes = {n: v * STRONGER if n in effect.grows else v for n, v in sizes.items()}
+    return None, 0.0
+
+
+def difference(one: Run, other: Run) -> float:
+    """Return the RMS between runs, as a share of the standard deviation, in the worst signal."""
+
+    def share(name: str) -> float:
+        a: Array = one.shown[name]
+        b: Array = other.shown[name]
+        return float(np.sqrt(np.mean((a - b) ** 2)) / b.std())
+
+    return max(share(name) for name in one.shown)

@@ -1,0 +1,150 @@
+"""Runs of a machine and their recordings: sensors with noise and quantisation, MCAP files."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mcap_ros2.writer import Writer
+
+from emir_analysis.blind.machine import Array, Machine
+from emir_analysis.blind.numbers import Numbers
+from emir_analysis.blind.operator import RANGE, Operator
+
+Command = Callable[[float, Array], float]  # time, s, and state -> y2
+
+COMMAND_PERIOD, SAMPLE_PERIOD = 0.032, 0.01  # s
+START = 1_700_000_000_000_000_000  # ns
+_HEADER = """\
+std_msgs/Header header
+{fields}
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+_JOINT = "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort"
+_PRESSURE = "float64 fluid_pressure\nfloat64 variance"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was commanded and what the sensors show of it, without noise and quantisation.
+
+    commands: (k,) every COMMAND_PERIOD. shown: (n,) of each sensor, every SAMPLE_PERIOD.
+    """
+
+    commands: Array
+    shown: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a run starts, at rest: boom angle, rad, and p_S, Pa."""
+
+    angle: float
+    p_s: float
+
+
+def operated(machine: Machine, start: Start, operator: Operator, duration: float) -> Run:
+    """Run a machine under an operator, who sees the stroke that the sensors show."""
+
+    def command(time: float, state: Array) -> float:
+        shown = machine.signals(state[None])["angle"][0]
+        return operator.command(time, float(machine.stated_stroke(shown)))
+
+    return _run(machine, start, command, duration)
+
+
+def repeated(machine: Machine, start: Start, commands: Array) -> Run:
+    """Run a machine under commands given before."""
+    return _run(
+        machine,
+        start,
+        lambda time, _: float(commands[round(time / COMMAND_PERIOD)]),
+        commands.size * COMMAND_PERIOD,
+    )
+
+
+def _run(machine: Machine, start: Start, command: Command, duration: float) -> Run:
+    count = round(duration / COMMAND_PERIOD)
+    samples = np.arange(int(count * COMMAND_PERIOD / SAMPLE_PERIOD)) * SAMPLE_PERIOD
+    late = machine.delay()
+    x = machine.start(start.angle, start.p_s)
+    commands = np.zeros(count)
+    states = np.empty((samples.size, x.size))
+    for k in range(count):
+        begin, end = k * COMMAND_PERIOD, (k + 1) * COMMAND_PERIOD
+        commands[k] = command(begin, x)
+        for a, b, acting in _pieces(commands, k, begin, end, late):
+            inside = (samples >= a - 1e-9) & (samples < b - 1e-9)
+            times = np.unique(np.concatenate([[a], np.maximum(samples[inside], a), [b]]))
+            found = machine.run(x, times, acting)
+            states[inside] = found[np.searchsorted(times, np.maximum(samples[inside], a))]
+            x = found[-1]
+    return Run(commands, machine.signals(states))
+
+
+def _pieces(
+    commands: Array, k: int, begin: float, end: float, late: float
+) -> Iterator[tuple[float, float, float]]:
+    """Yield the parts of a command period over which the command at the valve stays the same."""
+    steps = late / COMMAND_PERIOD
+    whole = int(steps)
+    change = begin + late - whole * COMMAND_PERIOD
+    older = commands[k - whole - 1] if k > whole else 0.0
+    newer = commands[k - whole] if k >= whole else 0.0
+    if change > begin + 1e-9:
+        yield begin, change, float(older)
+    yield max(begin, change), end, float(newer)
+
+
+def spread_of_strokes(stated: Numbers) -> tuple[float, float]:
+    """Return the strokes, m, between which an operator moves."""
+    plain = Machine(stated)
+    return float(plain.stated_stroke(RANGE[0])), float(plain.stated_stroke(RANGE[1]))
+
+
+def write(path: Path, run: Run, machine: Machine, random: np.random.Generator) -> None:
+    """Write a run as its sensors measure it, to one .mcap file."""
+    n = machine.n
+    size = run.shown["angle"].size
+    step = n.resolver_span / 2**n.resolver_bits
+    angle = np.round(run.shown["angle"] / step) * step
+    pressure_noise = n.pressure_noise * random.standard_normal((2, size))
+    gauge_noise = n.deflection_noise * random.standard_normal(size)
+    topics = {
+        "/joint_states": (SAMPLE_PERIOD, angle),
+        "/cylinder": (SAMPLE_PERIOD, machine.stated_stroke(angle)),
+        "/pressure_lifting": (SAMPLE_PERIOD, run.shown["pressure_lifting"] + pressure_noise[0]),
+        "/pressure_lowering": (SAMPLE_PERIOD, run.shown["pressure_lowering"] + pressure_noise[1]),
+        "/boom_deflection": (SAMPLE_PERIOD, run.shown["deflection"] + gauge_noise),
+        "/valve_command": (COMMAND_PERIOD, run.commands),
+    }
+    with path.open("wb") as stream, Writer(stream) as writer:
+        joint = writer.register_msgdef("sensor_msgs/msg/JointState", _HEADER.format(fields=_JOINT))
+        pressure = writer.register_msgdef(
+            "sensor_msgs/msg/FluidPressure", _HEADER.format(fields=_PRESSURE)
+        )
+        for topic, (period, values) in topics.items():
+            for k, value in enumerate(values.tolist()):
+                ns = START + round(k * period * 1e9)
+                stamp = {"sec": ns // 10**9, "nanosec": ns % 10**9}
+                header = {"stamp": stamp, "frame_id": ""}
+                if "pressure" in topic:
+                    message = {"header": header, "fluid_pressure": value, "variance": 0.0}
+                else:
+                    message = {
+                        "header": header,
+                        "name": ["joint"],
+                        "position": [value],
+                        "velocity": [],
+                        "effort": [],
+                    }
+                writer.write_message(
+                    topic, pressure if "pressure" in topic else joint, message, ns, ns
+                )

@@ -1,0 +1,244 @@
+"""`emir bench graph`: how fast the graph steps, how late messages and timers are.
+
+Everything is measured from outside the nodes: by recordings, and by the clock on the wall.
+"""
+
+import argparse
+import math
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+
+from emir_analysis import bags
+from emir_analysis.bench.reading import reading_figures
+from emir_analysis.bench.timing import Figure, text, write_json
+from emir_analysis.errors import InputError
+from emir_common.quantity import ParameterError
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
+from emir_ros import qos
+from emir_ros.graph import Plan
+from emir_ros.run import run_plan
+from emir_ros.shell import NodeError
+from emir_ros.wire import Wire, stamp_ns
+
+Array = NDArray[np.float64]
+Part = tuple[str, list[Figure]]
+
+START = 2.0  # s of simulated time in a short run, whose cost is that of starting and stopping
+RATES = (31.25, 1000.0)  # Hz, at which latency is measured
+RECORDED_RATE = 25_000.0  # Hz
+SETTLING = 30.0  # s within which two processes have to find each other
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure what the arguments say; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        found = {}
+        for title, figures in _parts(options):
+            print(text(title, figures), flush=True)  # noqa: T201 (a command prints)
+            found[title] = figures
+        if options.json:
+            write_json(found, options.json)
+    except (InputError, NodeError, ParameterError) as error:
+        sys.stderr.write(f"emir bench graph: {error}\n")
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="emir bench graph", description=__doc__)
+    for name, default, what in (
+        ("simulated", 60.0, "simulated time of a run in lock step"),
+        ("latency", 10.0, "time for each rate"),
+        ("jitter", 20.0, "time in real time, once unloaded and once loaded"),
+        ("recorder", 10.0, "time during which messages are sent to the recorder"),
+        ("reading", 3.0, "time for each reader"),
+    ):
+        about = f"{what}; default {default:g}"
+        parser.add_argument(f"--{name}", type=_positive, default=default, metavar="S", help=about)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    return parser
+
+
+def _positive(word: str) -> float:
+    value = float(word)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{word}: has to be positive")
+    return value
+
+
+def _parts(options: argparse.Namespace) -> Iterator[Part]:
+    with tempfile.TemporaryDirectory(prefix="emir-bench-") as name:
+        folder = Path(name)
+        for processes in ("one", "many"):
+            yield _lockstep(folder, processes, options.simulated)
+        yield from (_latency(rate, options.latency) for rate in RATES)
+        yield "Control period in real time", _jitter(folder / "alone", options.jitter)
+        with _busy_processors():
+            title = "The same, a busy process on every processor"
+            figures = _jitter(folder / "loaded", options.jitter)
+        yield title, figures
+        yield _recorder(folder / "recorder", options.recorder)
+        bag = folder / f"{options.simulated:g}-one"
+        yield "Reading that recording, every message decoded", reading_figures(bag, options.reading)
+
+
+def _lockstep(folder: Path, processes: str, simulated: float) -> Part:
+    """Run the whole graph, recorded; what a short run takes, too, does not count."""
+    taken = []
+    for duration in (START, START + simulated):
+        plan = Plan(bag=folder / f"{duration - START:g}-{processes}", duration=duration)
+        begin = time.perf_counter()
+        _run(plan, processes)
+        taken.append(time.perf_counter() - begin)
+    seconds = taken[1] - taken[0]
+    messages = sum(map(len, bags.read(plan.bag).values())) * simulated / (simulated + START)
+    return f"Lock step in {processes} process{'es' if processes == 'many' else ''}, recorded", [
+        Figure("plant periods of 8 ms", simulated * 1e9 / PLANT_PERIOD_NS / seconds, "1/s"),
+        Figure("control periods of 32 ms", simulated * 1e9 / CONTROL_PERIOD_NS / seconds, "1/s"),
+        Figure("messages", messages / seconds, "1/s"),
+        Figure("simulated time", simulated / seconds, "s/s"),
+    ]
+
+
+def _run(plan: Plan, processes: str) -> None:
+    if run_plan(plan, processes) != 0:
+        raise NodeError("the graph did not run to its end")
+
+
+def _latency(rate: float, seconds: float) -> Part:
+    """Measure from before `publish` in one process to the callback in another."""
+    here, there = multiprocessing.get_context("spawn").Pipe()
+    listener = multiprocessing.get_context("spawn").Process(target=_listen, args=(there,))
+    listener.start()
+    rclpy.init()
+    node = rclpy.create_node("bench_sender")
+    wire, kind = Wire(JOINT_STATES), conversions.message_class(JOINT_STATES.type)
+    publisher = node.create_publisher(kind, "bench", qos.offered(lockstep=False))
+    until = time.monotonic() + SETTLING
+    while not publisher.get_subscription_count() and time.monotonic() < until:
+        time.sleep(0.01)
+    period, sent = 1.0 / rate, 0
+    begin = time.monotonic()
+    while sent < rate * seconds:
+        time.sleep(max(begin + sent * period - time.monotonic(), 0.0))
+        publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
+        sent += 1
+    time.sleep(0.1)
+    here.send("enough")
+    late = np.array(here.recv())
+    listener.join()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    title = f"Latency between two processes at {rate:g} Hz"
+    return title, [*_spread(late), Figure("lost", 100.0 * (1.0 - late.size / sent), "%")]
+
+
+def _listen(connection: Connection) -> None:
+    """Report how long each message was on its way, s, once told that it is enough."""
+    rclpy.init()
+    node = rclpy.create_node("bench_listener")
+    late: list[float] = []
+
+    def receive(data: bytes) -> None:
+        late.append((time.monotonic_ns() - stamp_ns(data)) * 1e-9)
+
+    kind = conversions.message_class(JOINT_STATES.type)
+    node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    while not connection.poll():
+        executor.spin_once(timeout_sec=0.1)
+    connection.send(late)
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def _spread(seconds: Array) -> list[Figure]:
+    """Return median, 99 % quantile and maximum, ms."""
+    if not seconds.size:
+        raise NodeError("no message arrived")
+    median, late, most = np.quantile(seconds, [0.5, 0.99, 1.0]) * 1e3
+    return [
+        Figure("median", median, "ms"),
+        Figure("p99", late, "ms"),
+        Figure("largest", most, "ms"),
+    ]
+
+
+def _jitter(bag: Path, seconds: float) -> list[Figure]:
+    """Return how far the control period of the running graph is from 32 ms."""
+    _run(Plan(bag=bag, trajectory="hold", duration=seconds + START, lockstep=False), "many")
+    (stamps,) = (
+        [message.stamp for message in messages]
+        for name, messages in bags.read(bag).items()
+        if name.endswith(VALVE_COMMAND.name)
+    )
+    first = stamps[0] + START * 1e9  # when everybody has started
+    periods = np.diff([stamp for stamp in stamps if stamp >= first])
+    return _spread(np.abs(periods - CONTROL_PERIOD_NS) * 1e-9)
+
+
+@contextmanager
+def _busy_processors() -> Iterator[None]:
+    """Keep every processor busy with a process that computes and nothing else."""
+    command = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(command) for _ in range(os.cpu_count() or 1)]  # noqa: S603 (our own)
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def _recorder(bag: Path, seconds: float) -> Part:
+    """Send messages to a recorder of its own process and count what it has recorded."""
+    words = ["--ros-args", "-p", f"bag:={bag}", "-p", f"topics:=[{JOINT_STATES.name}]"]
+    recorder = subprocess.Popen(  # noqa: S603 (our own node)
+        [sys.executable, "-P", "-m", "emir_ros.recorder_node", *words]
+    )
+    rclpy.init()
+    node = rclpy.create_node("bench_sender")
+    kind = conversions.message_class(JOINT_STATES.type)
+    publisher = node.create_publisher(kind, JOINT_STATES.name, qos.offered(lockstep=False))
+    wire, sent = Wire(JOINT_STATES), 0
+    until = time.monotonic() + SETTLING
+    while not publisher.get_subscription_count() and time.monotonic() < until:
+        time.sleep(0.01)
+    begin = time.monotonic()
+    while (now := time.monotonic() - begin) < seconds:
+        while sent < now * RECORDED_RATE:
+            publisher.publish(wire.encode(time.time_ns(), {"angle": 0.0}))
+            sent += 1
+        time.sleep(1e-4)
+    time.sleep(0.5)
+    recorder.send_signal(signal.SIGINT)
+    recorder.wait()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    recorded = sum(map(len, bags.read(bag).values())) if bag.exists() else 0
+    return f"Recorder, messages sent for {seconds:g} s", [
+        Figure("sent", sent / now, "1/s"),
+        Figure("recorded", recorded / now, "1/s"),
+        Figure("lost", float(sent - recorded), "1"),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

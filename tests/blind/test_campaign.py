@@ -1,0 +1,177 @@
+"""The blind test itself: repeatable machines, nothing lost, figures that mean what they say."""
+
+import json
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from emir_analysis.blind import campaign as campaigns
+from emir_analysis.blind import puzzle as puzzles
+from emir_analysis.blind.campaign import campaign, read_log, workers
+from emir_analysis.blind.hidden import CATALOGUE
+from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
+from emir_analysis.blind.puzzle import KINDS, MATTERS, hidden_in, puzzle
+from emir_analysis.blind.report import report
+from emir_analysis.blind.trial import Outcome, Plan, foreign_effects
+from emir_analysis.cli import main
+from emir_analysis.errors import InputError
+from emir_plant.effects import REGISTRY
+
+FOREIGN = (Path(__file__).parent / "foreign.py").read_text()
+
+
+def outcome(
+    machine: int, kind: str, hidden: list[str], verdict: str, named: list[str] | None = None
+) -> Outcome:
+    """Return an outcome with errors of 3, 2 and 1 times the noise."""
+    stages = {"nominal": 3.0, "refitted": 2.0, "with_effect": 1.0}
+    errors = {stage: {"piston_stroke": value} for stage, value in stages.items()}
+    return Outcome(machine, kind, hidden, {}, 0.1, verdict, named or [], [], "", errors, 1.0)
+
+
+def fake(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Outcome:
+    """Answer at once."""
+    return outcome(number, "none", [], "nothing_missing")
+
+
+@pytest.fixture(autouse=True)
+def no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is diagnosed here, and nobody waits long."""
+    monkeypatch.setattr(campaigns, "PATIENCE", 0.5)
+    monkeypatch.setattr(campaigns, "trial", fake)
+
+
+def test_the_catalogue_is_all_of_the_registry() -> None:
+    assert {effect.name for effect in CATALOGUE} == REGISTRY.keys()
+    assert not {effect.name for effect in foreign_effects(FOREIGN)} & REGISTRY.keys()
+
+
+def test_every_effect_has_its_turn() -> None:
+    of_one = [k for k in range(6 * len(CATALOGUE)) if KINDS[k % len(KINDS)] == "one"]
+    drawn = [hidden_in(7, k, CATALOGUE, ())[0].name for k in of_one[: len(CATALOGUE)]]
+    assert sorted(drawn) == sorted(REGISTRY)
+
+
+def test_a_seed_gives_the_same_machine_and_its_effect_matters(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(puzzles, "PROBE", 8.0)
+    stated = read_numbers(DATA_SHEET)
+    one, same = (puzzle(stated, 11, 0, (), 8.0, ("payload",)) for _ in range(2))
+    assert one.hidden == same.hidden
+    assert one.size == same.size >= MATTERS
+    np.testing.assert_array_equal(one.learn.commands, same.learn.commands)
+    np.testing.assert_array_equal(
+        one.judge.shown["pressure_lifting"], same.judge.shown["pressure_lifting"]
+    )
+    for name, tolerance in stated.tolerances.items():
+        factor = getattr(one.machine.n, name) / getattr(stated.numbers, name)
+        assert abs(factor - 1.0) <= tolerance
+
+
+class Interrupted(Executor):
+    """Works until the third machine, then the user has enough."""
+
+    def submit(self, work: Any, /, *given: Any, **named: Any) -> Any:
+        """Return what is done already."""
+        future: Future[Outcome] = Future()
+        if given[1] < 3:
+            future.set_result(work(*given))
+        else:
+            future.set_exception(KeyboardInterrupt())
+        return future
+
+
+def test_an_interrupted_test_goes_on_where_it_was(tmp_path: Path) -> None:
+    log, plan, told = tmp_path / "log.jsonl", Plan(1, 60.0), []
+    with pytest.raises(KeyboardInterrupt):
+        campaign(plan, 5, log, Interrupted(), told.append)
+    had = len(read_log(log, plan))
+    with log.open("a") as lines:
+        lines.write('{"machine": 4, "ki')  # cut off in the middle of a line
+    with ThreadPoolExecutor(1) as executor:
+        outcomes = campaign(plan, 5, log, executor, told.append)
+    assert [o.machine for o in outcomes] == [0, 1, 2, 3, 4]
+    assert f"{log} has {had} of 5 machines" in told
+    assert len(log.read_text().splitlines()) == 1 + 5
+    for line in log.read_text().splitlines():
+        json.loads(line)
+
+
+def test_the_log_of_another_seed_is_not_continued(tmp_path: Path) -> None:
+    log = tmp_path / "log.jsonl"
+    with ThreadPoolExecutor(1) as executor:
+        campaign(Plan(1, 60.0), 1, log, executor, lambda _: None)
+        with pytest.raises(InputError, match="another seed"):
+            campaign(Plan(2, 60.0), 1, log, executor, lambda _: None)
+
+
+def test_a_cluster_does_the_same_work(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    quiet: list[str] = []
+    with (
+        distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster,
+        workers(1, cluster.scheduler_address) as executor,
+    ):
+        outcomes = campaign(Plan(1, 60.0), 3, tmp_path / "log", executor, quiet.append)
+    assert [o.machine for o in outcomes] == [0, 1, 2]
+    assert len(quiet) == 3
+
+
+def test_figures_mean_what_they_say() -> None:
+    outcomes = [
+        outcome(0, "one", ["payload"], "found", ["payload"]),
+        outcome(1, "one", ["payload"], "found", ["viscous_friction"]),
+        outcome(2, "one", ["backlash"], "nothing_missing"),
+        outcome(3, "two", ["payload", "backlash"], "found", ["backlash", "payload"]),
+        outcome(4, "two", ["payload", "backlash"], "found", ["payload"]),
+        outcome(5, "none", [], "nothing_missing"),
+        outcome(6, "none", [], "found", ["payload"]),
+        outcome(7, "foreign", ["tight_spot"], "unexplained"),
+        outcome(8, "foreign", ["tight_spot"], "found", ["coulomb_friction"]),
+        outcome(9, "foreign", ["tight_spot"], "unexplained"),
+    ]
+    lines = [" ".join(line.split()) for line in report(outcomes).splitlines()]
+    assert "payload 1 payload, 1 viscous_friction" in lines
+    assert "tight_spot (foreign) 2 unexplained, 1 coulomb_friction" in lines
+    assert "one effect, named 1 of 3" in lines
+    assert "two effects, both named 1 of 2" in lines
+    assert "one of them, and no other 1 of 2" in lines
+    assert "a wrong effect named 1 of 5" in lines
+    assert "an effect of the catalogue called nothing 1 of 5" in lines
+    assert "healthy machine, false alarm 1 of 2" in lines
+    assert "foreign effect, unexplained 2 of 3" in lines
+    assert "piston_stroke 3.00 (3.00) 2.00 (2.00) 1.00 (1.00)" in lines
+    assert "every signal within 1.1 times the noise: 2 of 2" in lines
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--machines", "0"], "--machines 0"),
+        (["--jobs", "0"], "--jobs 0"),
+        (["--seed", "-1"], "--seed -1"),
+        (["--duration", "3"], "at least 20 s"),
+        (["--only", "magic"], "--only magic"),
+        (["--foreign", "nowhere.py"], "nowhere.py"),
+        (["--foreign", str(DATA_SHEET)], "foreign effects' file"),
+        (["--scheduler", "127.0.0.1:1"], "--scheduler 127.0.0.1:1"),
+    ],
+)
+def test_what_cannot_be_used_is_told_in_a_line(
+    words: list[str],
+    reason: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if "--scheduler" in words:
+        pytest.importorskip("distributed")
+    assert main(["blind", *words]) == 1
+    told = capsys.readouterr().err
+    assert reason in told
+    assert told.count("\n") == 1

@@ -14,6 +14,7 @@ from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParamet
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    CYLINDER_MOVE,
     CYLINDER_PREVIEW,
     PLANT_PERIOD_NS,
     TRUTH,
@@ -68,7 +69,7 @@ class ClosedLoop:
                 if "velocity_command" in wanted:
                     damping, valve = self._force_loop(damping, wanted["velocity_command"], reading)
                     signals |= valve
-                signals |= wanted
+                signals |= wanted | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
                 ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
                 _append(rows, signals | ahead)
             if tick < last:

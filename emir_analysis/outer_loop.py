@@ -85,9 +85,10 @@ class ShapedLoop:
 
 @dataclass(frozen=True)
 class LqgLoop:
-    """LQG about a planned motion; gives the valve command itself."""
+    """LQG, or by its name MPC, about a planned motion; gives the valve command itself."""
 
     lqg: Lqg
+    name: str = "lqg"
 
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
@@ -101,14 +102,14 @@ class LqgLoop:
             r.deflection,
         )
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, lqg_signals(outputs)
+        return state, lqg_signals(self.name, outputs)
 
 
-def lqg_signals(outputs: LqgOutputs) -> Signals:
+def lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
     """Return command and terms by the names of the topic table."""
     terms = outputs._asdict()
     command = terms.pop("valve_command")
-    return {"valve_command": command} | {f"lqg_{name}": value for name, value in terms.items()}
+    return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
 
 
 def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:

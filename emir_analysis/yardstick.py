@@ -10,6 +10,7 @@ controller that begins before gains nothing by that.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import get_args
 
 import numpy as np
@@ -19,11 +20,19 @@ from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
 from emir_analysis.compare import REST_PRESSURE, Run, dynamic_deflection
 from emir_analysis.limit import PAPER_MOVE, Move, least
 from emir_analysis.machine_model import actuator, boom_table
-from emir_analysis.outer_loop import CascadeLoop, LqgLoop, OuterLoop, PfcLoop, PfcTipLoop, ShapedLoop
+from emir_analysis.outer_loop import (
+    CascadeLoop,
+    LqgLoop,
+    OuterLoop,
+    PfcLoop,
+    PfcTipLoop,
+    ShapedLoop,
+)
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.lqg import Lqg, LqgParameters
+from emir_control.mpc import Mpc
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.regulator import RegulatorParameters
@@ -125,17 +134,17 @@ def controllers(machine: Machine, among: Range = EVERYDAY) -> dict[str, OuterLoo
     conventional = Cascade(CascadeParameters())
     shapers = {
         name: ShapedLoop(
-            ShapedCascade(
-                ShapedParameters(boom=lqg.boom, cascade=conventional, shaper=name)
-            )
+            ShapedCascade(ShapedParameters(boom=lqg.boom, cascade=conventional, shaper=name))
         )
         for name in get_args(Shaper)
     }
+    others = {"mpc": LqgLoop(Mpc(lqg), "mpc")} if find_spec("osqp") else {}
     return {
         "cascade": CascadeLoop(),
         **shapers,
         "pfc": PfcLoop(Pfc(joint)),
         "pfc_tip": PfcTipLoop(Tip(Pfc(tip))),
+        **others,
         "lqg": LqgLoop(Lqg(lqg)),
     }
 

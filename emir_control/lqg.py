@@ -70,7 +70,7 @@ class LqgParameters:
     actuator: ActuatorParameters = field(default_factory=ActuatorParameters)
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
     softness: float = quantity(
-        "1", 0.1, 2.0, "of the stated k_h: oil softer than stated does more harm", default=0.94
+        "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
     )
     allowance: float = quantity(
         "1", 0.0, 1.0, "of the plan's deflection over the smallest, for smoothness", default=0.055
@@ -83,9 +83,7 @@ class LqgParameters:
     rest_standstill: float = quantity("m/s", 0.0, 0.01, "the same at rest", default=3e-3)
     rest_deflection: float = quantity("m", 0.0, 1.0, "left alone at rest", default=2.5e-3)
     rest_position: float = quantity("m", 0.0, 1.0, "of the TCP left alone at rest", default=2e-2)
-    lead: float = quantity(
-        "s", 0.1, 10.0, "before the move, when it is planned", default=0.6
-    )
+    lead: float = quantity("s", 0.1, 10.0, "before the move, when it is planned", default=0.6)
     fill: FillParameters = field(default_factory=FillParameters)
     reading_time: float = quantity(
         "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=2.0
@@ -235,9 +233,7 @@ class Lqg:
 
     def _waiting(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, LqgOutputs]:
         """Return the shut valve of a move that is planned and has not begun."""
-        logic = self.drive.next_logic(
-            state.logic, inputs.pressure_lifting, self.parameters.period
-        )
+        logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
         outputs = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
         filled = state.filled._replace(velocity=0.0)
         return state._replace(command=0.0, logic=logic, filled=filled), outputs
@@ -275,16 +271,14 @@ class Lqg:
 
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
-        if inputs.move.since >= -self.parameters.lead:
+        if inputs.move.distance and inputs.move.since >= -self.parameters.lead:
             if state.moving:
                 return state
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
         count = 1 if state.moving else state.rest.periods + 1
         weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
         last = state.rest
-        rest = last._replace(
-            periods=count, angle=last.angle + weight * (inputs.angle - last.angle)
-        )
+        rest = last._replace(periods=count, angle=last.angle + weight * (inputs.angle - last.angle))
         if not state.filled.moved or state.moving:  # what was read before still holds
             force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
             rest = rest._replace(
@@ -316,8 +310,8 @@ class Lqg:
         hanging = float(plan.bending[0]) / math.cos(float(plan.angle[0]))
         offset = rest.bending / math.cos(angle) - hanging
         past = (0.0,) * law.delays
-        moving = move.distance != 0.0
-        return LqgState(plan, law, payload, offset, rest, estimate, past, logic, command, moving, filled)
+        memory = past, logic, command, move.distance != 0.0, filled
+        return LqgState(plan, law, payload, offset, rest, estimate, *memory)
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:

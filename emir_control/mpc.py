@@ -7,7 +7,7 @@ neither limit is near, its command is that of the LQG. Solved by OSQP (extra `mp
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
@@ -46,7 +46,7 @@ class MpcParameters:
 class Mpc(Lqg):
     """The control law; see `Lqg`."""
 
-    prediction: MpcParameters = MpcParameters() if find_spec("osqp") else None  # type: ignore[assignment]
+    prediction: MpcParameters = field(default_factory=MpcParameters)
 
     def _feedback(self, state: LqgState, estimate: Array, now: Now) -> float:
         """Return u off the plan, m/s; the LQG's where the program has no solution."""

@@ -11,7 +11,6 @@ one: what the shaper adds is taken off the trapezoid.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -41,9 +40,9 @@ def impulses(shaper: Shaper, frequency: float, damping: float) -> tuple[Impulse,
     decay = math.exp(-damping * math.pi / root)
     half = 0.5 / (frequency * root)
     if shaper == "zv":
-        weights: Sequence[float] = (1.0, decay)
+        weights = [1.0, decay]
     elif shaper == "zvd":
-        weights = (1.0, 2.0 * decay, decay * decay)
+        weights = [1.0, 2.0 * decay, decay * decay]
     else:
         raise ParameterError(f"shaper {shaper!r}: there are zv, zvd")
     total = sum(weights)

@@ -18,10 +18,12 @@ from emir_common.yaml_file import read_map
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.topics import OFFERED_COMMANDS, TOPICS
 
-CONTROLLERS = {
+VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
+CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
+CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_CONTROLLERS}
 NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
@@ -74,7 +76,10 @@ def check(plan: Plan) -> None:
     for name in plan.controllers:
         if name not in CONTROLLERS:
             raise ParameterError(f"controller {name!r}: there are {', '.join(CONTROLLERS)}")
-    Selector(plan.controllers, _from_the_start(plan))
+        if name in VALVE_CONTROLLERS and plan.switches:
+            raise ParameterError(f"controller {name!r}: cannot be switched to or from")
+    if plan.controller not in VALVE_CONTROLLERS:
+        Selector(plan.controllers, _from_the_start(plan))
     if plan.bag.exists():
         raise ParameterError(f"{plan.bag}: exists already, and is not overwritten")
     if plan.duration is not None and not 0.0 < plan.duration < float("inf"):

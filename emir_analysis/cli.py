@@ -192,6 +192,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
+    run_report.check_alike(runs)
     print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
     for file, write in (
         (options.json, run_report.write_json),
@@ -206,15 +207,25 @@ def _analyze(words: list[str]) -> int:
 def _compare(words: list[str]) -> int:
     from emir_analysis.compare_command import command
 
-    parser = argparse.ArgumentParser(prog="emir compare")
-    parser.add_argument("--angle", type=float, nargs="+", default=[45.0], metavar="DEG")
-    parser.add_argument("--payload", type=float, nargs="+", default=[0.0], metavar="KG")
+    about = (
+        "Every controller over a grid of posture, payload, size of the move and model error;"
+        " what is named is varied, the rest then stays as usual; of one case, its curves."
+    )
+    parser = argparse.ArgumentParser(prog="emir compare", description=about)
+    parser.add_argument("--angle", type=float, nargs="+", metavar="DEG", help="of the boom")
+    parser.add_argument("--payload", type=float, nargs="+", metavar="KG", help="not told to them")
+    parser.add_argument("--size", type=float, nargs="+", metavar="MM", help="of the move")
+    parser.add_argument(
+        "--error", nargs="+", metavar="NAME", help="model errors: none, 'oil -20%%', ..."
+    )
     parser.add_argument("--trajectory", default="lift-lower", help="lift-lower or lower-lift")
     parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="mean and deviation")
     parser.add_argument("--pfc", type=Path, metavar="FILE", help="made by emir design")
     parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="velocity and deflection")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
+    parser.add_argument("--trade-off", action="store_true", help="instead: cascade over k_p and T")
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
@@ -252,6 +263,10 @@ def _design(words: list[str]) -> int:
         "--observer", type=float, default=0.0, metavar="M/S",
         help="Kalman filter in place of an independent model: unknown input's change per sample",
     )  # fmt: skip
+    parser.add_argument(
+        "--schedule", action="store_true",
+        help="models over posture and payload, which the controller reads off the static force",
+    )  # fmt: skip
     parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
@@ -279,7 +294,7 @@ def _bench(words: list[str]) -> int:
 def _linearize(words: list[str]) -> int:
     from emir_analysis.linearize_command import command
 
-    print(command(words))
+    print(command(words, _progress))
     return 0
 
 
@@ -302,7 +317,8 @@ def _figures(words: list[str]) -> int:
 
 
 def _diagnose(words: list[str]) -> int:
-    from emir_analysis.diagnosis import command, summary
+    from emir_analysis.diagnosis import actuator, command, summary
+    from emir_plant.actuator import is_actuator
 
     parser = argparse.ArgumentParser(prog="emir diagnose")
     parser.add_argument("bag", type=Path, help="the recording to find out from")
@@ -312,6 +328,12 @@ def _diagnose(words: list[str]) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
     o = parser.parse_args(words)
+    if is_actuator(o.datasheet):
+        found = actuator.command(
+            o.bag, o.datasheet, o.signals, o.judge, json=o.json, html=o.html, progress=_progress
+        )
+        print(actuator.summary(found))
+        return 0
     diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
     print(summary(diagnosis))
     return 0

@@ -1,5 +1,6 @@
 """The controllers on the same moves of the nonlinear machine: what each does to the TCP."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +14,9 @@ from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
-from emir_control.pfc import PREVIEW, Future, Pfc
-from emir_control.pfc_file import STROKE, TIP_ANGLE
+from emir_control.pfc import PREVIEW, Future
+from emir_control.pfc_file import SCHEDULED, STROKE, TIP_ANGLE
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack
 from emir_plant.parameters import Machine
@@ -25,6 +27,7 @@ Run = dict[str, Array]
 
 MOVING = 1e-4  # m/s of reference speed
 SETTLED = 1.0  # s after the stop
+STILL = 0.005  # m of dynamic deflection
 REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 
 
@@ -37,9 +40,13 @@ def controllers(
     loops: dict[str, OuterLoop] = {"cascade": CascadeLoop()}
     futures: tuple[Future, ...] = ("preview", "velocity", "constant")
     for future in futures:
-        loops[f"pfc, {future}"] = PfcLoop(Pfc(replace(joint, future=future)))
+        loops[f"pfc, {future}"] = PfcLoop(law_of(replace(joint, future=future)))
     for future in futures:
-        loops[f"pfc_tip, {future}"] = PfcTipLoop(Tip(Pfc(replace(tip, future=future))))
+        loops[f"pfc_tip, {future}"] = PfcTipLoop(Tip(law_of(replace(tip, future=future))))
+    following = {output: pfc_file.find(SCHEDULED, output) for output in (STROKE, TIP_ANGLE)}
+    by_load = {output: law_of(pfc_file.load(file, output)) for output, file in following.items()}
+    loops[f"pfc, {SCHEDULED}"] = PfcLoop(by_load[STROKE])
+    loops[f"pfc_tip, {SCHEDULED}"] = PfcTipLoop(Tip(by_load[TIP_ANGLE]))
     return loops
 
 
@@ -50,8 +57,10 @@ class MoveFigures:
     A move lasts from where a preview first shows it to the reference's stop. lag: s, of the
     stroke at the end of the plateau. up, down: m, extremes during the move. after, settled: m,
     largest size from the stop and from 1 s after it until the next move or the end.
-    error: m, largest of stroke against reference. roughness: m/s^2, root mean square of the
-    piston's acceleration.
+    error, error_rms: m, stroke against reference, largest and root mean square. roughness:
+    m/s^2, root mean square of the piston's acceleration. settling: s, from the stop until the
+    size stays below STILL; infinite where it does not. travel: of the valve's command, full
+    strokes. oil: m^3, from the pump. The last four count until the next move or the end.
     """
 
     lag: float
@@ -61,6 +70,10 @@ class MoveFigures:
     settled: float
     error: float
     roughness: float
+    error_rms: float
+    settling: float
+    travel: float
+    oil: float
 
 
 def repeated(
@@ -95,17 +108,22 @@ def dynamic_deflection(signals: Run) -> Array:
 
 def figures(signals: Run) -> list[MoveFigures]:
     """Return the figures of each move of a run, in order."""
-    moves = list(_moves(signals["reference_velocity"]))
-    ends = [move.start for move in moves[1:]] + [signals["reference_stroke"].size]
-    return [_of_move(signals, move, end) for move, end in zip(moves, ends, strict=True)]
+    found = list(moves(signals["reference_velocity"]))
+    ends = [move.start for move in found[1:]] + [signals["reference_stroke"].size]
+    return [_of_move(signals, move, end) for move, end in zip(found, ends, strict=True)]
 
 
-def _moves(velocity: Array) -> Iterator[slice]:
+def moves(velocity: Array) -> Iterator[slice]:
     """Yield the control periods of each move, from where a preview first shows it."""
     moving = np.abs(velocity) > MOVING
     edges = np.flatnonzero(np.diff(moving, prepend=False, append=False))
     for start, stop in edges.reshape(-1, 2):
         yield slice(max(int(start) - PREVIEW, 0), int(stop))
+
+
+def direction(velocity: Array) -> str:
+    """Return what a move with these reference velocities is called."""
+    return "lift" if velocity.sum() > 0.0 else "lower"
 
 
 def _of_move(signals: Run, move: slice, end: int) -> MoveFigures:
@@ -118,6 +136,10 @@ def _of_move(signals: Run, move: slice, end: int) -> MoveFigures:
     during = slice(move.start * TICKS, move.stop * TICKS)
     after = slice(move.stop * TICKS, end * TICKS)
     settled = slice(after.start + round(SETTLED / PLANT_PERIOD), after.stop)
+    whole = slice(during.start, after.stop)
+    swinging = np.flatnonzero(np.abs(bending[after]) > STILL)
+    still = int(swinging[-1]) + 1 if swinging.size else 0
+    pumped = np.maximum(signals["flow_lifting"], 0.0) + np.maximum(signals["flow_lowering"], 0.0)
     return MoveFigures(
         lag=float(error[last] / velocity[last]),
         up=float(bending[during].max()),
@@ -125,7 +147,11 @@ def _of_move(signals: Run, move: slice, end: int) -> MoveFigures:
         after=float(np.abs(bending[after]).max()),
         settled=float(np.abs(bending[settled]).max()),
         error=float(np.abs(error[move.start : end]).max()),
-        roughness=float(np.sqrt(np.mean(acceleration[during.start : after.stop] ** 2))),
+        roughness=float(np.sqrt(np.mean(acceleration[whole] ** 2))),
+        error_rms=float(np.sqrt(np.mean(error[move.start : end] ** 2))),
+        settling=still * PLANT_PERIOD if still < bending[after].size else math.inf,
+        travel=float(np.abs(np.diff(signals["valve_command"][move.start : end])).sum()),
+        oil=float(pumped[whole].sum()) * PLANT_PERIOD,
     )
 
 
@@ -136,7 +162,11 @@ COLUMNS = (
     ("after", "after / cm", 100.0),
     ("settled", "1 s after / cm", 100.0),
     ("error", "error / mm", 1000.0),
+    ("error_rms", "rms error / mm", 1000.0),
     ("roughness", "rms dv/dt / mm/s2", 1000.0),
+    ("settling", "settling / s", 1.0),
+    ("travel", "valve travel", 1.0),
+    ("oil", "oil / l", 1000.0),
 )
 
 
@@ -150,15 +180,17 @@ def as_text(runs: dict[str, list[Run]]) -> str:
     for name, repeated in runs.items():
         velocity = repeated[0]["reference_velocity"]
         by_move = zip(*(figures(signals) for signals in repeated), strict=True)
-        for move, found in zip(_moves(velocity), by_move, strict=True):
-            direction = "lift" if velocity[move].sum() > 0.0 else "lower"
-            lines.append(f"| {name} | {direction} | {' | '.join(_cells(found))} |")
+        for move, found in zip(moves(velocity), by_move, strict=True):
+            lines.append(f"| {name} | {direction(velocity[move])} | {' | '.join(_cells(found))} |")
     return "\n".join(lines)
 
 
 def _cells(repeated: Sequence[MoveFigures]) -> Iterator[str]:
     for name, _, factor in COLUMNS:
         values = factor * np.array([getattr(move, name) for move in repeated])
+        if not np.isfinite(values).all():
+            yield "-"
+            continue
         spread = f" \u00b1 {values.std(ddof=1):.2f}" if values.size > 1 else ""
         yield f"{values.mean():.2f}{spread}"
 

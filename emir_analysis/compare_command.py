@@ -1,20 +1,21 @@
 """`emir compare`: every controller on the same moves, as one table and one picture."""
 
-import itertools
 import math
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from emir_analysis import damping
+from emir_analysis import compare_grid, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated
+from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.errors import InputError
 from emir_analysis.outer_loop import OuterLoop
-from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
-from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
+from emir_control.trajectory import TrajectoryParameters, named
+from emir_plant.parameters import cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1
 
@@ -27,16 +28,54 @@ def command(options: Namespace, progress: Progress) -> str:
         if options.picture:
             save(damping.picture(joint1()), options.picture)
         return damping.as_text(joint1())
-    chosen = select(controllers(options.pfc, options.pfc_tip), options.controllers)
-    trajectory = named(options.trajectory, TrajectoryParameters())
-    if trajectory.parameters.distance == 0.0:
-        raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
+    if options.trade_off:
+        curve = trade_off.curve(joint1(), progress)
+        if options.picture:
+            save(trade_off.picture(curve), options.picture)
+        return trade_off.as_text(curve)
+    chosen = select(_known(options), options.controllers)
+    cases = _cases(options)
+    if len(cases) > 1:
+        return _grid(chosen, cases, options, progress)
+    return _one(chosen, cases[0], options, progress)
+
+
+def _known(options: Namespace) -> dict[str, OuterLoop]:
+    """Return every controller, those of `emir yardstick` made for this machine."""
+    known, machine = controllers(options.pfc, options.pfc_tip), joint1()
+    as_it_is = replace(
+        yardstick.EVERYDAY,
+        delay=0.0,
+        hysteresis=0.0,
+        supply=machine.supply.p0,
+        threshold=machine.logic_block.threshold,
+    )
+    others = yardstick.controllers(machine, as_it_is)
+    return known | {k: loop for k, loop in others.items() if f"{k}, preview" not in known}
+
+
+def _cases(options: Namespace) -> list[Case]:
+    """Return the whole grid, or what is asked for, the rest of it as usual."""
+    given = {name: getattr(options, name) for name in NOMINAL}
+    instead = NOMINAL if any(given.values()) else WHOLE
     if options.repeat < 1:
         raise ParameterError(f"repeat = {options.repeat}: at least 1")
-    cases = list(itertools.product(options.angle, options.payload))
-    if options.picture and len(cases) > 1:
-        raise InputError("one picture shows one posture and payload")
-    return "\n\n".join(_table(chosen, trajectory, case, options, progress) for case in cases)
+    return grid({name: given[name] or instead[name] for name in NOMINAL})
+
+
+def _grid(
+    chosen: dict[str, OuterLoop], cases: list[Case], options: Namespace, progress: Progress
+) -> str:
+    if options.repeat > 1:
+        raise InputError("--repeat is for one case: a grid varies enough")
+    found = compare_grid.results(joint1(), chosen, cases, progress)
+    if options.picture:
+        save(compare_grid.picture(found), options.picture)
+    if options.csv:
+        compare_grid.write_csv(found, options.csv)
+    count = len({result.case for result in found})
+    table, claims = compare_grid.as_text(found), compare_grid.order_of_merit(found)
+    return f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
 
 
 def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
@@ -47,22 +86,21 @@ def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, Ou
     return {name: known[name] for name in names or known}
 
 
-def _table(
-    chosen: dict[str, OuterLoop],
-    trajectory: AwayAndBack,
-    case: tuple[float, float],
-    options: Namespace,
-    progress: Progress,
-) -> str:
-    """Return the table of one case, an angle in deg and a payload in kg."""
-    angle, payload = case
-    title = f"{angle:g} deg, {payload:g} kg"
-    machine = with_values(joint1(), {"geometry.payload": payload})
+def _one(chosen: dict[str, OuterLoop], case: Case, options: Namespace, progress: Progress) -> str:
+    """Return the table of one case."""
+    title = f"{case.angle:g} deg, {case.payload:g} kg"
+    machine = case.machine(joint1())
+    given = TrajectoryParameters(distance=case.size * 1e-3)
+    trajectory = named(options.trajectory, given)
+    if trajectory.parameters.distance == 0.0:
+        raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
+    for line in cautions(machine):
+        progress(line)
     runs: dict[str, list[Run]] = {}
     try:
         for name, outer in chosen.items():
             progress(f"{title}: {name}")
-            start = math.radians(angle)
+            start = math.radians(case.angle)
             runs[name] = list(repeated(machine, trajectory, outer, start, options.repeat))
     except SimulationError as error:
         return f"{title}: {error}"

@@ -6,19 +6,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 from emir_analysis.design_pfc import (
+    ANGLES,
     ORDERS,
     OUTPUTS,
+    PAYLOADS,
     DesignTask,
     OperatingPoint,
     as_text,
     design_pfc,
     picture,
+    scheduled,
     stability_map,
 )
 from emir_analysis.errors import InputError
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
-from emir_plant.parameters import Machine
+from emir_plant.parameters import Machine, cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
@@ -36,9 +40,14 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
         tuning=_tuning(options),
     )
     machine = _machine(options.machine)
+    for line in cautions(with_values(machine, {"geometry.payload": options.payload})):
+        progress(line)
     progress("linearizing and reducing")
     try:
-        parameters = design_pfc(machine, task)
+        if options.schedule:
+            parameters = scheduled(machine, task, ANGLES, PAYLOADS)
+        else:
+            parameters = design_pfc(machine, task)
     except SimulationError as error:
         raise InputError(str(error)) from None
     pfc_file.save(options.out, parameters, output, _made_by(options, task))
@@ -70,6 +79,7 @@ def _tuning(options: Namespace) -> dict[str, object]:
 def _made_by(options: Namespace, task: DesignTask) -> dict[str, object]:
     words = [f"--from {options.machine}", f"--controller {task.controller}"]
     words += [f"--order {task.order}", f"--angle {options.angle:g}"]
+    words += ["--schedule"] if options.schedule else []
     words += [f"--payload {options.payload:g}", f"--observer {options.observer:g}"]
     return {
         "command": f"emir design {' '.join(words)}",

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,8 +17,10 @@ from emir_control.internal_model import InternalModel
 from emir_control.pfc import Pfc, PfcParameters
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.prefilter import valve_command
+from emir_control.schedule import Schedule
+from emir_control.scheduled_pfc import law_of
 from emir_msgs_py.topics import CONTROL_PERIOD_NS
-from emir_plant import core, operating_point
+from emir_plant import core, linkage, operating_point
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
@@ -110,6 +112,40 @@ def design_pfc(machine: Machine, task: DesignTask) -> PfcParameters:
     return PfcParameters(model=model, **task.tuning)  # type: ignore[arg-type] # checked there
 
 
+def scheduled(
+    machine: Machine, task: DesignTask, angles: Sequence[float], payloads: Sequence[float]
+) -> PfcParameters:
+    """Return a design whose models follow posture, rad, and payload, kg; both rising.
+
+    Where the machine has no slow motion with a payload, the model of the next steeper posture
+    stands in. Raises SimulationError where it has none in the steepest.
+    """
+    models: list[tuple[InternalModel, ...]] = []
+    for payload in payloads:
+        row: list[InternalModel] = []
+        for angle in reversed(angles):
+            point = replace(task.point, angle=angle, payload=payload)
+            try:
+                row.insert(0, design_pfc(machine, replace(task, point=point)).model)
+            except SimulationError:
+                if not row:
+                    raise
+                row.insert(0, row[0])
+        models.append(tuple(row))
+    p = Plant(machine).record[0]
+    strokes = np.array([linkage.stroke(angle, p) for angle in angles])
+    forces = np.array([[_static_force(machine, a, load) for a in angles] for load in payloads])
+    schedule = Schedule(strokes, np.array(payloads), forces, tuple(models))
+    return replace(design_pfc(machine, task), schedule=schedule)
+
+
+def _static_force(machine: Machine, angle: float, payload: float) -> float:
+    """Return the force, N, on which the boom rests at an angle, rad; whether the pump gives it."""
+    p = Plant(with_values(machine, {"geometry.payload": payload})).record[0]
+    torque = p["mode_weight"][0] * math.cos(angle) / p["mode_joint"][0]
+    return float(torque / linkage.lever_arm(angle, p))
+
+
 @dataclass(frozen=True)
 class StabilityMap:
     """Spectral radius of the closed loop; stable below 1.
@@ -130,12 +166,25 @@ class StabilityMap:
 
 ANGLES = tuple(math.radians(degrees) for degrees in (30.0, 45.0, 60.0, 75.0))
 PAYLOADS = (0.0, 500.0, 1000.0, 1500.0)
+FINE_ANGLES = tuple(math.radians(degrees) for degrees in np.linspace(30.0, 75.0, 7))
+FINE_PAYLOADS = tuple(np.linspace(0.0, 1500.0, 7))  # between the models of a schedule, too
 VELOCITIES = (0.01, -0.01)  # lifting and lowering
 
 
 def stability_map(machine: Machine, controller: str, parameters: PfcParameters) -> StabilityMap:
-    """Return the closed loop's stability over posture, payload and direction."""
-    law = Pfc(parameters)
+    """Return the closed loop's stability over posture, payload and direction.
+
+    Of a schedule between its nodes, too, for a payload that it has read off rightly.
+    """
+    law, p = law_of(parameters), Plant(machine).record[0]
+    fine = parameters.schedule is not None
+    angles, payloads = (FINE_ANGLES, FINE_PAYLOADS) if fine else (ANGLES, PAYLOADS)
+
+    def parts(angle: float, payload: float) -> list[design.Part]:
+        if isinstance(law, Pfc):
+            return [(law, 1.0)]
+        weights = law.schedule.weights(linkage.stroke(angle, p), payload)
+        return [(law.laws[k], weight) for k, weight in weights.items()]
 
     def radius(angle: float, payload: float, velocity: float) -> float:
         point = OperatingPoint(angle=angle, payload=payload, velocity=velocity)
@@ -143,13 +192,13 @@ def stability_map(machine: Machine, controller: str, parameters: PfcParameters) 
             model = velocity_model(machine, point, OUTPUTS[controller])
         except SimulationError:
             return math.nan
-        return design.spectral_radius(law, model)
+        return design.spectral_radius(parts(angle, payload), model)
 
     tables = {
-        v: np.array([[radius(angle, load, v) for angle in ANGLES] for load in PAYLOADS])
+        v: np.array([[radius(angle, load, v) for angle in angles] for load in payloads])
         for v in VELOCITIES
     }
-    return StabilityMap(ANGLES, PAYLOADS, tables)
+    return StabilityMap(angles, payloads, tables)
 
 
 def as_text(found: StabilityMap) -> str:

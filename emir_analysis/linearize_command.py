@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -24,14 +25,14 @@ from emir_analysis.linear_models import (
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_plant.core import Truth
-from emir_plant.parameters import Machine
+from emir_plant.parameters import Machine, cautions
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
 PICTURE, NUMBERS = "linear.png", "linear.json"
 
 
-def command(words: list[str]) -> str:
+def command(words: list[str], progress: Callable[[str], None]) -> str:
     """Linearize, reduce, compare, write the files; return what to tell.
 
     Raises InputError and ParameterError.
@@ -45,6 +46,8 @@ def command(words: list[str]) -> str:
     machine = joint1() if options.machine == "joint1" else load_sheet(Path(options.machine)).machine
     if options.payload is not None:
         machine = with_values(machine, {"geometry.payload": options.payload})
+    for line in cautions(machine):
+        progress(line)
     velocity = None if options.command is not None else options.velocity * 1e-3
     if velocity == 0.0 or options.command == 0.0:
         raise InputError("at rest the valve is in its dead zone: the machine has to move")

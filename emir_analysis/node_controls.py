@@ -11,6 +11,7 @@ from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc, PfcInputs
+from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import AwayAndBack, Move, Reference, TrajectoryInputs
 from emir_msgs_py.topics import (
@@ -119,27 +120,32 @@ class PfcControl:
 
     inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW, CYLINDER_STATES)
     outputs: ClassVar[Topics] = (PFC_TERMS, VELOCITY_COMMAND)
-    pfc: Pfc
+    pfc: Pfc | ScheduledPfc
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
-        state, outputs = self.pfc.step(state or self.pfc.initial(inputs), inputs, dt)
+        law: Any = self.pfc
+        state, outputs = law.step(state or law.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc", outputs)
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
         inputs = self._inputs(signals)
-        return self.pfc.follow(state or self.pfc.initial(inputs), inputs, command)
+        law: Any = self.pfc
+        return law.follow(state or law.initial(inputs), inputs, command)
 
     def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the state whose next command is the one in force."""
         inputs = self._inputs(signals)
-        return self.pfc.take_over(state or self.pfc.initial(inputs, command), inputs)
+        law: Any = self.pfc
+        return law.take_over(state or law.initial(inputs, command), inputs)
 
     def _inputs(self, signals: Signals) -> PfcInputs:
         wanted = _reference(signals)
-        return PfcInputs(wanted.stroke, wanted.velocity, _preview(signals), signals["stroke"])
+        stroke, force = signals["stroke"], signals["force"]
+        preview = _preview(signals)
+        return PfcInputs(wanted.stroke, wanted.velocity, preview, stroke, stroke, force)
 
 
 @dataclass(frozen=True)
@@ -147,7 +153,7 @@ class PfcTipControl:
     """pfc_tip_node: the TCP's angle alpha_6 (paper 3.3)."""
 
     inputs: ClassVar[Topics] = (
-        CYLINDER_REFERENCE, CYLINDER_PREVIEW, JOINT_STATES, BOOM_DEFLECTION,
+        CYLINDER_REFERENCE, CYLINDER_PREVIEW, JOINT_STATES, BOOM_DEFLECTION, CYLINDER_STATES,
     )  # fmt: skip
     outputs: ClassVar[Topics] = (PFC_TIP_TERMS, VELOCITY_COMMAND)
     tip: Tip
@@ -169,7 +175,7 @@ class PfcTipControl:
         return self.tip.take_over(state or self.tip.initial(inputs, command), inputs)
 
     def _inputs(self, signals: Signals) -> TipInputs:
-        measured = signals["angle"], signals["deflection"]
+        measured = signals["angle"], signals["deflection"], signals["force"]
         return TipInputs(_reference(signals), _preview(signals), *measured)
 
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
+from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import NO_MOVE, Move, Reference
@@ -47,13 +48,15 @@ class CascadeLoop:
 class PfcLoop:
     """Predictive control of the stroke, law (12)."""
 
-    pfc: Pfc
+    pfc: Pfc | ScheduledPfc
 
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
         wanted = now.reference
-        inputs = PfcInputs(wanted.stroke, wanted.velocity, now.preview, now.reading.stroke)
-        state, outputs = self.pfc.step(state or self.pfc.initial(inputs), inputs, dt)
+        stroke, force = now.reading.stroke, now.reading.force
+        inputs = PfcInputs(wanted.stroke, wanted.velocity, now.preview, stroke, stroke, force)
+        law: Any = self.pfc
+        state, outputs = law.step(state or law.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc", outputs)
 
 
@@ -65,7 +68,8 @@ class PfcTipLoop:
 
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
-        inputs = TipInputs(now.reference, now.preview, now.reading.angle, now.reading.deflection)
+        r = now.reading
+        inputs = TipInputs(now.reference, now.preview, r.angle, r.deflection, r.force)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
         return state, pfc_signals("pfc_tip", outputs)
 

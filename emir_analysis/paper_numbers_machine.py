@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +22,7 @@ from emir_analysis.figure_steps import (
     StepResponses,
     Without,
 )
-from emir_analysis.paper_number import NOT_MEASURED, Number, is_about, judged
+from emir_analysis.paper_number import Number, is_about, judged
 from emir_common.parameter_tree import with_values
 from emir_plant import core, linkage
 from emir_plant.boom import section_model
@@ -46,14 +45,12 @@ WHOLE = 0.9  # share of its mean below which a flow counts as interrupted
 APART = 0.05  # share, from which on two frequencies differ
 FULL_STROKE = np.arange(10.0, 50.0, 2.0)  # Hz, at which the spool is driven
 SWEEP_TICK = 2.5e-4  # s
-NEEDS_ROBOT = "needs the extra robot"
 
 
 def measure(machine: Machine, steps: StepResponses) -> list[Number]:
     """Return the numbers of a machine. Raises SimulationError where it cannot hold its boom."""
     return [
         _reach(machine),
-        _bodies(),
         _orders(machine),
         _bending_mode(machine),
         _sag(machine),
@@ -84,21 +81,6 @@ def _reach(machine: Machine) -> Number:
         "joint 1 to TCP; at rest, boom horizontal, pump 320 bar",
         judged(is_about(reach, 22.5, 0.1)),
     )  # fmt: skip
-
-
-def _bodies() -> Number:
-    what, paper, how = "main parts, bodies, DOF", "24, 39, 96", "counted in the robot's model"
-    if find_spec("pinocchio") is None:
-        return Number(2, what, paper, "", how, NOT_MEASURED, NEEDS_ROBOT)
-    from emir_plant.robot.dynamics import Mechanics  # noqa: PLC0415 (needs the extra)
-    from emir_plant.robot.sheet import robot  # noqa: PLC0415 (needs the extra)
-
-    found = Mechanics(robot())
-    bodies = [name for name in found.topology.bodies if name != "column"]
-    # an arm's sections are one part
-    parts = {name.partition("_section")[0] for name in bodies}
-    ours = len(parts), len(bodies), found.size
-    return Number(2, what, paper, ", ".join(map(str, ours)), how, judged(ours == (24, 39, 96)))
 
 
 def _orders(machine: Machine) -> Number:

@@ -7,10 +7,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from emir_analysis import figure_steps, paper_numbers_control, paper_numbers_machine
+from emir_analysis import (
+    figure_steps,
+    linkage_table,
+    paper_numbers_control,
+    paper_numbers_machine,
+    paper_numbers_robot,
+)
 from emir_analysis.errors import InputError
 from emir_analysis.figure_steps import StepResponses
-from emir_analysis.paper_number import Number
+from emir_analysis.paper_number import NOT_MEASURED, Number
 from emir_plant.parameters import Machine
 
 
@@ -44,6 +50,12 @@ class Table:
             "mean; p_H: its least. The valve with even edges is data/joint1_even_edges.yaml.",
             "",
             figure_steps.as_text(self.steps),
+            "",
+            "# Linkages",
+            "",
+            "Joints 1-5 of the whole robot. At a dead point the piston moves nothing.",
+            "",
+            linkage_table.as_text(linkage_table.reaches()),
         ]
         return "\n".join(lines) + "\n"
 
@@ -63,7 +75,11 @@ class Table:
             | asdict(r.mode)
             for machine, r in figure_steps.rows(self.steps)
         ]
-        return {"numbers": [asdict(n) for n in self.numbers], "step_responses": steps}
+        return {
+            "numbers": [asdict(n) for n in self.numbers],
+            "step_responses": steps,
+            "linkages": linkage_table.as_json(linkage_table.reaches()),
+        }
 
 
 def measure(machine: Machine, steps: StepResponses, progress: Callable[[str], None]) -> Table:
@@ -72,6 +88,11 @@ def measure(machine: Machine, steps: StepResponses, progress: Callable[[str], No
     numbers = paper_numbers_machine.measure(machine, steps)
     progress("table: its control")
     numbers += paper_numbers_control.measure(machine)
+    progress("table: the whole robot")
+    numbers += paper_numbers_robot.measure()
+    for number in numbers:
+        if number.met == NOT_MEASURED:
+            progress(f"table: {number.number}, {number.what}: NOT MEASURED, {number.reason}")
     return Table(sorted(numbers, key=lambda n: n.number), steps)
 
 

@@ -34,7 +34,8 @@ from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.lqg import Lqg
 from emir_control.mpc import Mpc
-from emir_control.pfc import Pfc, PfcParameters
+from emir_control.pfc import PfcParameters
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.topics import (
@@ -49,7 +50,8 @@ Values = dict[str, Any]
 
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "force_loop", PLANT)
-OF_EVERY_NODE = ("lockstep", "input_timeout", "standby")  # parameters of nodes, not controllers
+# parameters of nodes, not controllers
+OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -131,11 +133,11 @@ def _force_loop(values: Values) -> NodeControl:
 
 
 def _pfc(values: Values) -> NodeControl:
-    return PfcControl(Pfc(_design(pfc_file.STROKE, values)))
+    return PfcControl(law_of(_design(pfc_file.STROKE, values)))
 
 
 def _pfc_tip(values: Values) -> NodeControl:
-    return PfcTipControl(Tip(Pfc(_design(pfc_file.TIP_ANGLE, values))))
+    return PfcTipControl(Tip(law_of(_design(pfc_file.TIP_ANGLE, values))))
 
 
 def _lqg(values: Values) -> NodeControl:
@@ -158,7 +160,6 @@ _CONTROLS = {
 
 
 def _design(output: str, values: Values) -> PfcParameters:
-    file = values.pop("model_file", "")
-    design = pfc_file.load(Path(str(file)) if file else pfc_file.default_file(output), output)
+    design = pfc_file.load(pfc_file.find(str(values.pop("model_file", "")), output), output)
     words = {name: values.pop(name) for name in ("form", "future") if name in values}
     return with_values(replace(design, **words), values)

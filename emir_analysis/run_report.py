@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,15 @@ from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
 from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
+from emir_analysis.robot_metrics import robot_metrics
+from emir_analysis.robot_report import headline as robot_headline
+from emir_analysis.robot_report import robot_plots
 from emir_analysis.run_plots import HYDRAULICS, MOTION, plot
-from emir_analysis.run_signals import load_run
+from emir_analysis.run_signals import is_robot, load_run
 from emir_analysis.signals import Recording
 
-SHOWN = {"m": ("cm", 100.0), "Pa": ("bar", 1e-5)}  # how people in the field read them
+# how people in the field read them
+SHOWN = {"m": ("cm", 100.0), "Pa": ("bar", 1e-5), "rad": ("deg", math.degrees(1.0))}
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,15 @@ class RunAnalysis:
 def analyze(bag: Path) -> RunAnalysis:
     """Compute the figures of a recording of the graph. Raises InputError as `load_run`."""
     recording = load_run(bag)
-    return RunAnalysis(bag, bags.metadata(bag).get("emir", {}), recording, metrics(recording))
+    figures = robot_metrics(recording) if is_robot(recording) else metrics(recording)
+    return RunAnalysis(bag, bags.metadata(bag).get("emir", {}), recording, figures)
+
+
+def check_alike(runs: Sequence[RunAnalysis]) -> None:
+    """Raise InputError where runs of joint 1 and of the whole robot are to stand side by side."""
+    for run in runs:
+        if is_robot(run.recording) != is_robot(runs[0].recording):
+            raise InputError(f"{run.bag}: another model than {runs[0].bag}: analyze it by itself")
 
 
 def text(run: RunAnalysis) -> str:
@@ -105,8 +117,7 @@ def write_report(runs: Sequence[RunAnalysis], file: Path) -> None:
     recordings = {name: run.recording for name, run in zip(names, runs, strict=True)}
     blocks: list[Block] = [
         *(_headline(runs[0]) if len(runs) == 1 else ()),
-        Plot(plot(MOTION, recordings), "Piston and TCP. The paper's Fig. 9 shows the lower two."),
-        Plot(plot(HYDRAULICS, recordings), "Valve, chamber pressures and safety logic block."),
+        *(robot_plots(recordings) if is_robot(runs[0].recording) else _joint1_plots(recordings)),
         Heading("Figures"),
         _figures(names, runs),
     ]
@@ -132,6 +143,13 @@ def _figures(names: Sequence[str], runs: Sequence[RunAnalysis]) -> Table:
     return Table(("figure", *values, "unit", "meaning"), rows)
 
 
+def _joint1_plots(recordings: Mapping[str, Recording]) -> list[Block]:
+    return [
+        Plot(plot(MOTION, recordings), "Piston and TCP. The paper's Fig. 9 shows the lower two."),
+        Plot(plot(HYDRAULICS, recordings), "Valve, chamber pressures and safety logic block."),
+    ]
+
+
 def _shown(metric: Metric) -> tuple[str, str]:
     """Return value and unit as text, in the unit people use."""
     unit, factor = SHOWN.get(metric.unit, (metric.unit, 1.0))
@@ -142,6 +160,9 @@ def _shown(metric: Metric) -> tuple[str, str]:
 
 
 def _headline(run: RunAnalysis) -> tuple[Text]:
+    if is_robot(run.recording):
+        shown = {m.name: " ".join(_shown(m)) for m in run.metrics}
+        return (Text(robot_headline(shown), lead=True),)
     by_name = {m.name: m for m in run.metrics}
 
     def say(name: str) -> str:

@@ -8,6 +8,16 @@ from numpy.typing import NDArray
 from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Recording, Source, load
+from emir_msgs_py.robot_topics import (
+    PRESSURES,
+    ROBOT_CYLINDER_REFERENCE,
+    ROBOT_CYLINDER_STATES,
+    ROBOT_TRUTH,
+    ROBOT_VALVE_COMMAND,
+    TCP_DEFLECTION,
+    TCP_POSE,
+    TCP_REFERENCE,
+)
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CYLINDER_REFERENCE,
@@ -22,6 +32,10 @@ from emir_msgs_py.topics import (
 
 NEEDED = (CYLINDER_STATES, CYLINDER_REFERENCE, VALVE_COMMAND, PRESSURE_LIFTING, PRESSURE_LOWERING)
 OPTIONAL = (JOINT_STATES, BOOM_DEFLECTION, TRUTH)  # a real machine has no truth
+ROBOT_NEEDED = (
+    ROBOT_CYLINDER_STATES, ROBOT_CYLINDER_REFERENCE, ROBOT_VALVE_COMMAND, PRESSURES, TCP_POSE,
+    TCP_DEFLECTION, TCP_REFERENCE,
+)  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -33,14 +47,21 @@ def load_run(path: Path) -> Recording:
     """
     there = bags.recorded_topics(path)
     sources: dict[str, Source] = {}
-    for topic in (*NEEDED, *OPTIONAL):
+    robot = full_name(TCP_POSE, there) is not None
+    needed, optional = (ROBOT_NEEDED, (ROBOT_TRUTH,)) if robot else (NEEDED, OPTIONAL)
+    for topic in (*needed, *optional):
         name = full_name(topic, there)
         if name is not None:
             fields = topic.fields.items()
             sources |= {signal: Source(name, about.path, about.unit) for signal, about in fields}
-        elif topic in NEEDED:
+        elif topic in needed:
             raise InputError(f"{path}: no topic {topic.name}; there are {', '.join(sorted(there))}")
     return load(path, sources)
+
+
+def is_robot(recording: Recording) -> bool:
+    """Return whether the run is one of the whole robot."""
+    return "tcp_x" in recording.signals
 
 
 def full_name(topic: Topic, there: set[str]) -> str | None:

@@ -4,6 +4,7 @@ A machine comes in as a sampled linear model from the piston velocity command to
 output; nothing here knows which machine it is.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from emir_common.quantity import ParameterError
 from emir_control.force_loop import ForceLoopParameters
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import Pfc, PfcInputs, PfcState
+from emir_control.scheduled_pfc import blended
 
 Array = NDArray[np.float64]
 
@@ -121,32 +123,44 @@ def with_observer(model: InternalModel, noise: Noise) -> InternalModel:
     return InternalModel(A, B, C, model.period, P @ C / (C @ P @ C + noise.output**2))
 
 
-def closed_loop(law: Pfc, machine: InternalModel) -> Array:
-    """Return the matrix z(i+1) = M z(i) of law and machine at a constant set point, no limits.
+Part = tuple[Pfc, float]  # a law and its weight
 
-    z: the machine's state, then model, errors and command of the law. The law itself is asked:
-    it is linear, so its answers to unit states are the columns.
+
+def closed_loop(parts: Sequence[Part], machine: InternalModel) -> Array:
+    """Return the matrix z(i+1) = M z(i) of laws and machine at a constant set point, no limits.
+
+    parts: one law of weight 1, or several of a schedule whose weights stand still. z: the
+    machine's state, each law's model and errors, and the command. The laws themselves are asked:
+    they are linear, so their answers to unit states are the columns.
     """
-    p = law.parameters
-    sizes = [machine.order, p.model.order, p.error_window, 1]
+    laws, weights = [law for law, _ in parts], dict(enumerate(w for _, w in parts))
+    p = laws[0].parameters
+    own = [size for law in laws for size in (law.parameters.model.order, p.error_window)]
+    sizes = [machine.order, *own, 1]
     columns = []
     for unit in SMALL * np.eye(sum(sizes)):
-        x, model, errors, command = np.split(unit, np.cumsum(sizes)[:-1])
+        x, *memory, command = np.split(unit, np.cumsum(sizes)[:-1])
         inputs = PfcInputs(0.0, 0.0, (0.0,) * p.coincidence[-1], float(machine.C @ x))
-        state = PfcState(0.0, model, errors, float(command[0]))
-        after, outputs = law.step(state, inputs, p.model.period)
+        states = [
+            PfcState(0.0, model, errors, float(command[0]))
+            for model, errors in zip(memory[::2], memory[1::2], strict=True)
+        ]
+        after, outputs = blended(laws, weights, states, inputs, p.model.period)
         moved = machine.next(x, outputs.velocity_command)
-        columns.append(np.concatenate([moved, after.model, after.errors, [after.command]]))
+        remembered = [part for state in after for part in (state.model, state.errors)]
+        columns.append(np.concatenate([moved, *remembered, [after[0].command]]))
     return np.array(columns).T / SMALL
 
 
-def spectral_radius(law: Pfc, machine: InternalModel) -> float:
+def spectral_radius(law: Pfc | Sequence[Part], machine: InternalModel) -> float:
     """Return the largest |z| of the closed loop's poles; below 1 it is stable.
 
     An independent model and the machine both integrate the same command; where they stand
-    against each other changes nothing. That one pole at 1 is left out.
+    against each other changes nothing. That one pole at 1, of each law, is left out.
     """
-    poles = linalg.eigvals(closed_loop(law, machine))
-    if law.parameters.model.observer is None:
-        poles = np.delete(poles, np.argmin(abs(poles - 1.0)))
+    parts = [(law, 1.0)] if isinstance(law, Pfc) else law
+    poles = linalg.eigvals(closed_loop(parts, machine))
+    for part, _ in parts:
+        if part.parameters.model.observer is None:
+            poles = np.delete(poles, np.argmin(abs(poles - 1.0)))
     return float(max(abs(poles)))

@@ -50,6 +50,7 @@ class ForceLoopInputs(NamedTuple):
     angle: float  # of the joint, rad
     pressure_lifting: float  # Pa
     pressure_lowering: float  # Pa
+    stroke: float | None = None  # m, of a linkage that is no triangle; None: from the angle
 
 
 class ForceLoopOutputs(NamedTuple):
@@ -80,7 +81,7 @@ class ForceLoop:
 
         An input that is not a number shuts the valve and leaves the force's state as it was.
         """
-        if not all(math.isfinite(value) for value in inputs):
+        if not all(math.isfinite(value) for value in inputs if value is not None):
             return state._replace(wanted=0.0), ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
         p = self.parameters
         if not math.isfinite(state.static_force):  # begun without a measurement
@@ -90,7 +91,9 @@ class ForceLoop:
         feedback = p.gain * (force - static_force)
         wanted = inputs.velocity_command
         wanted += piston_velocity(inputs.joint_rate_command, inputs.angle, p.prefilter)
-        stroke = piston_stroke(inputs.angle, p.prefilter)
+        stroke = inputs.stroke
+        if stroke is None:
+            stroke = piston_stroke(inputs.angle, p.prefilter)
         allowed = limited(wanted, state.wanted, stroke, dt, p.limits)
         velocity = off_the_ends(allowed - feedback, stroke, 0.0, p.limits)  # damping moves, too
         command = valve_command(velocity, p.prefilter)

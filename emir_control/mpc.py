@@ -65,7 +65,7 @@ class Mpc(Lqg):
         return command - flow
 
 
-class _Problem:
+class Problem:
     """The program of a regulator: unknowns u in velocity weights, and the excess."""
 
     def __init__(self, law: Regulator, count: int, unit: float) -> None:
@@ -110,5 +110,5 @@ class _Problem:
 
 
 @lru_cache(maxsize=8)
-def _problem(law: Regulator, count: int, unit: float) -> _Problem:
-    return _Problem(law, count, unit)
+def _problem(law: Regulator, count: int, unit: float) -> Problem:
+    return Problem(law, count, unit)

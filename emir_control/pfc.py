@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_control.internal_model import InternalModel
+from emir_control.schedule import Schedule
 
 Array = NDArray[np.float64]
 
@@ -39,12 +40,14 @@ class PfcParameters:
     coincidence: h_j, samples ahead, increasing; at least as many as basis functions.
     form: the command itself, or its change as in the paper's (12); both give the same.
     future: where c(i+h) comes from: known ahead, extrapolated from the set point's rate, or c(i).
+    schedule: models in place of that one, by posture and payload (`scheduled_pfc.py`).
     """
 
     model: InternalModel
     coincidence: tuple[int, ...] = (PREVIEW,)
     form: Form = "positional"
     future: Future = "preview"
+    schedule: Schedule | None = None
     basis: int = quantity("1", 1, 4, "number of basis functions 1, k, k^2 ...", default=1)
     response_time: float = quantity(
         "s", 0.05, 20.0, "T_CLRT, after which 5 % of an error are left", default=1.5
@@ -55,6 +58,9 @@ class PfcParameters:
     speed_limit: float = quantity("m/s", 1e-4, 1.0, "of the command", default=0.05)
     acceleration_limit: float = quantity(
         "m/s^2", 1e-3, 100.0, "of the command, from sample to sample", default=0.5
+    )
+    load_time: float = quantity(
+        "s", 0.01, 60.0, "smooths the force from which a schedule reads the payload", default=3.0
     )
 
     def __post_init__(self) -> None:
@@ -100,6 +106,8 @@ class PfcInputs(NamedTuple):
     set_rate: float  # dc/dt
     ahead: Sequence[float]  # c(i+1) ... c(i+20)
     output: float  # y(i)
+    stroke: float = math.nan  # m, what a schedule goes by
+    force: float = math.nan  # of the piston, N, as the stroke
 
 
 class PfcOutputs(NamedTuple):

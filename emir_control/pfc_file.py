@@ -12,14 +12,24 @@ from emir_common.quantity import ParameterError, quantities
 from emir_common.yaml_file import read_map
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import PfcParameters
+from emir_control.schedule import Schedule
 
 STROKE, TIP_ANGLE = "stroke", "tip_angle"  # what is controlled, m or rad
 ARRAYS = ("A", "B", "C", "observer")
+SCHEDULED = "scheduled"  # name of the design that comes with the project and follows the payload
+GRID = ("strokes", "payloads", "forces")  # of a schedule
 
 
 def default_file(output: str) -> Path:
     """Return the design that comes with the project, for `stroke` or `tip_angle`."""
     return Path(str(files("emir_control") / "data" / f"pfc_{output}.yaml"))
+
+
+def find(name: str, output: str) -> Path:
+    """Return the file of a design: a path, `scheduled` or nothing for those of the project."""
+    if name == SCHEDULED:
+        return Path(str(files("emir_control") / "data" / f"pfc_{output}_{SCHEDULED}.yaml"))
+    return Path(name) if name else default_file(output)
 
 
 def load(file: Path, output: str) -> PfcParameters:
@@ -37,14 +47,13 @@ def load(file: Path, output: str) -> PfcParameters:
 
 def save(file: Path, parameters: PfcParameters, output: str, made_by: dict[str, Any]) -> None:
     """Write a design. made_by: what a reader needs to make it again. Raises ParameterError."""
-    model = {"output": output, "period": parameters.model.period}
-    for name in ARRAYS:
-        values = getattr(parameters.model, name)
-        model[name] = None if values is None else values.tolist()
+    model = {"output": output, "period": parameters.model.period} | _arrays(parameters.model)
     tuning = {f.name: getattr(parameters, f.name) for f in dataclasses.fields(parameters)}
-    del tuning["model"]
+    del tuning["model"], tuning["schedule"]
     tuning["coincidence"] = list(parameters.coincidence)
     content = {"made_by": made_by, "tuning": tuning, "model": model}
+    if parameters.schedule is not None:
+        content["schedule"] = _written(parameters.schedule)
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=100)
     try:
         file.write_text(text, encoding="utf-8")
@@ -65,7 +74,36 @@ def _parameters(content: Any, output: str) -> PfcParameters:
     model = _group(content, "model", {"output", "period", *ARRAYS})
     if model.get("output") != output:
         raise ParameterError(f"made for {model.get('output')}, wanted is one for {output}")
-    return PfcParameters(model=_model(model), coincidence=tuple(points), **tuning)
+    own, schedule = _model(model), None
+    if "schedule" in content:
+        schedule = _schedule(_group(content, "schedule", {*GRID, "models"}), own.period)
+    return PfcParameters(model=own, coincidence=tuple(points), schedule=schedule, **tuning)
+
+
+def _arrays(model: InternalModel) -> dict[str, Any]:
+    values = {name: getattr(model, name) for name in ARRAYS}
+    return {name: None if value is None else value.tolist() for name, value in values.items()}
+
+
+def _written(schedule: Schedule) -> dict[str, Any]:
+    grid: dict[str, Any] = {name: getattr(schedule, name).tolist() for name in GRID}
+    grid["models"] = [[_arrays(model) for model in row] for row in schedule.models]
+    return grid
+
+
+def _schedule(entries: dict[str, Any], period: float) -> Schedule:
+    try:
+        grid = {name: np.array(entries[name], dtype=float) for name in GRID}
+        models = tuple(
+            tuple(_model({**model, "period": period}) for model in row) for row in entries["models"]
+        )
+    except KeyError as error:
+        raise ParameterError(f"schedule: {error.args[0]}: missing") from None
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError("schedule: not arrays of numbers and rows of models") from None
+    return Schedule(models=models, **grid)
 
 
 def _group(content: dict[str, Any], name: str, known: set[str]) -> dict[str, Any]:

@@ -3,18 +3,24 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from emir_control.pfc import Pfc, PfcInputs, PfcOutputs, PfcState
-from emir_control.prefilter import PrefilterParameters, joint_angle, piston_velocity
+from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
+from emir_control.prefilter import (
+    PrefilterParameters,
+    joint_angle,
+    piston_stroke,
+    piston_velocity,
+)
+from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.trajectory import Reference
 
 
 class TipState(NamedTuple):
-    """The deflection that belongs to the weight, and the law's own state."""
+    """The deflection that belongs to the weight, and the law's own state, scheduled or not."""
 
     sag: float  # rad
-    pfc: PfcState
+    pfc: Any
 
 
 class TipInputs(NamedTuple):
@@ -24,6 +30,7 @@ class TipInputs(NamedTuple):
     ahead: Sequence[float]  # reference strokes of the next periods, m
     angle: float  # of the joint, rad
     deflection: float  # alpha_6 - alpha_1, rad
+    force: float = math.nan  # of the piston, N; only a schedule asks for it
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,7 @@ class Tip:
     under its weight, and no piston motion is wanted for that.
     """
 
-    pfc: Pfc
+    pfc: Pfc | ScheduledPfc
     linkage: PrefilterParameters = field(default_factory=PrefilterParameters)
 
     def initial(self, inputs: TipInputs, command: float = 0.0) -> TipState:
@@ -67,4 +74,6 @@ class Tip:
             inputs.reference.velocity / arm,
             [joint_angle(stroke, self.linkage) for stroke in inputs.ahead],
             inputs.angle + inputs.deflection - sag,
+            piston_stroke(inputs.angle, self.linkage),
+            inputs.force,
         )

@@ -1,7 +1,7 @@
 """Desired piston motion: trapezoidal velocity profiles and their integral."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -86,6 +86,16 @@ class TrajectoryParameters:
         check_ranges(self)
 
 
+class Timing(NamedTuple):
+    """As TrajectoryParameters, for any way, such as that of a TCP."""
+
+    distance: float  # m
+    speed: float  # m/s
+    ramp: float  # s
+    delay: float  # s
+    pause: float  # s
+
+
 class TrajectoryState(NamedTuple):
     """Where the trajectory stands."""
 
@@ -103,7 +113,7 @@ class TrajectoryInputs(NamedTuple):
 class AwayAndBack:
     """Trapezoidal dh_d/dt away and back, and its integral h_d."""
 
-    parameters: TrajectoryParameters
+    parameters: TrajectoryParameters | Timing
 
     @property
     def duration(self) -> float:
@@ -124,12 +134,13 @@ class AwayAndBack:
         self, state: TrajectoryState, inputs: TrajectoryInputs, dt: float
     ) -> tuple[TrajectoryState, Reference]:
         """Return the reference of this control period of dt, s."""
-        reference = self._at(state, state.ticks * dt)
+        reference = self.at(state.ticks * dt, state.start)
         return TrajectoryState(state.start, state.ticks + 1), reference
 
     def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
         """Return the strokes, m, of the `count` periods that follow the next step's own."""
-        return tuple(self._at(state, (state.ticks + k) * dt).stroke for k in range(1, count + 1))
+        times = ((state.ticks + k) * dt for k in range(1, count + 1))
+        return tuple(self.at(time, state.start).stroke for time in times)
 
     def move(self, state: TrajectoryState, dt: float) -> Move:
         """Return the move of the next step's own time; before the way back, that back."""
@@ -140,12 +151,12 @@ class AwayAndBack:
             return Move(back, duration, -p.distance)
         return Move(since, duration, p.distance)
 
-    def _at(self, state: TrajectoryState, time: float) -> Reference:
-        """Return the reference `time` s after the start."""
+    def at(self, time: float, start: float = 0.0) -> Reference:
+        """Return the reference `time` s after the beginning at `start`, m."""
         p = self.parameters
         away = self._move.at(time - p.delay)
         back = self._move.at(time - p.delay - self._move.duration - p.pause)
-        return Reference(state.start + away.stroke - back.stroke, away.velocity - back.velocity)
+        return Reference(start + away.stroke - back.stroke, away.velocity - back.velocity)
 
 
 def named(name: str, parameters: TrajectoryParameters) -> AwayAndBack:
@@ -154,13 +165,16 @@ def named(name: str, parameters: TrajectoryParameters) -> AwayAndBack:
     lift-lower and lower-lift take the sign, hold the length of the move from the name.
     Raises ParameterError for an unknown name.
     """
+    return AwayAndBack(replace(parameters, distance=distance_of(name, parameters)))
+
+
+def distance_of(name: str, parameters: TrajectoryParameters) -> float:
+    """Return the signed distance, m, of the trajectory of that name.
+
+    Raises ParameterError for an unknown name.
+    """
     size = abs(parameters.distance)
     distances = {"lift-lower": size, "lower-lift": -size, "hold": 0.0}
     if name not in distances:
         raise ParameterError(f"trajectory {name!r}: there are {', '.join(distances)}")
-    p = parameters
-    return AwayAndBack(
-        TrajectoryParameters(
-            distance=distances[name], speed=p.speed, ramp=p.ramp, delay=p.delay, pause=p.pause
-        )
-    )
+    return distances[name]

@@ -70,11 +70,14 @@ def message(topic: Topic, stamp: int, signals: Mapping[str, float]) -> Any:
     result.header.frame_id = topic.frame
     arrays: dict[str, list[float]] = {}
     for name, field in topic.fields.items():
-        ((attribute, index),) = _steps(field.path)
-        if index is None:
-            setattr(result, attribute, float(signals[name]))
-        else:
+        *parents, (attribute, index) = _steps(field.path)
+        if index is not None:
             arrays.setdefault(attribute, []).append(float(signals[name]))
+            continue
+        owner = result
+        for parent, _ in parents:
+            owner = getattr(owner, parent)
+        setattr(owner, attribute, float(signals[name]))
     for attribute, numbers in arrays.items():
         setattr(result, attribute, numbers)
     if topic.type == JOINT_STATE:

@@ -1,5 +1,6 @@
 """What each signal of the topic table means, in words; recordings carry it beside path and unit."""
 
+from emir_msgs_py.robot_topics import JOINTS
 from emir_msgs_py.topics import OUTER_LOOPS, Topic
 
 MEANINGS = {
@@ -70,9 +71,32 @@ MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in 
 MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
 
 
+MEANINGS |= {
+    "true_rate": "rate of the joint's angle",
+    "supply_pressure": "pressure at the pump",
+} | {f"deflection_{axis}": f"TCP's deflection along {axis}, by bending" for axis in "xyz"}
+MEANINGS |= {f"deflection_about_{axis}": f"TCP's turn about {axis}, by bending" for axis in "xyz"}
+for _pose, _text in (("tcp", "TCP"), ("tcp_reference", "demanded TCP")):
+    MEANINGS |= {f"{_pose}_{axis}": f"{_text}, position, {axis}" for axis in "xyz"}
+    MEANINGS |= {f"{_pose}_q{axis}": f"{_text}, quaternion, {axis}" for axis in "xyzw"}
+
+
+def _meaning(signal: str) -> str:
+    """Return a signal's meaning; of the robot's signals of one joint that of joint 1's own."""
+    if signal in MEANINGS:
+        return MEANINGS[signal]
+    joint, _, quantity = signal.partition("_")
+    if joint not in JOINTS:
+        raise KeyError(signal)
+    of = {"angle": "joint angle, measured by the resolver", "true_angle": "joint angle"}
+    known = MEANINGS | of
+    text = known.get(quantity) or known[quantity.removeprefix("true_")]
+    return f"{joint}: {text.replace('h_1', 'h')}"
+
+
 def field_table(topic: Topic) -> dict[str, dict[str, str]]:
     """Return {signal: {path, unit, meaning}} of a topic. Raises KeyError without a meaning."""
     return {
-        signal: {"path": field.path, "unit": field.unit, "meaning": MEANINGS[signal]}
+        signal: {"path": field.path, "unit": field.unit, "meaning": _meaning(signal)}
         for signal, field in topic.fields.items()
     }

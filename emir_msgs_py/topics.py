@@ -8,8 +8,13 @@ named numbers of a controller it is a JointState too, whose `name` says what eac
 from dataclasses import dataclass
 from typing import Literal
 
+JOINT1, ROBOT = "joint1", "robot"  # the models of the machine; the robot's table: robot_topics.py
+
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
+
+Every = Literal["plant", "control"]
+Quality = Literal["sensor", "command"]
 
 PLANT_PERIOD_NS = 8_000_000  # sensors, four times a control period
 CONTROL_PERIOD_NS = 32_000_000  # paper 3.2
@@ -36,8 +41,8 @@ class Topic:
     name: str
     type: str
     publisher: str
-    every: Literal["plant", "control"]
-    quality: Literal["sensor", "command"]
+    every: Every
+    quality: Quality
     fields: dict[str, Field]
     names: tuple[str, ...] = ()
     frame: str = ""
@@ -49,13 +54,14 @@ class Topic:
         return (self.publisher, *self.instead)
 
 
-def _named_numbers(
+def named_numbers(
     name: str,
     publisher: str,
     every: Literal["plant", "control"],
     units: dict[str, str],
-    quality: Literal["sensor", "command"] = "sensor",
+    quality: Quality = "sensor",
 ) -> Topic:
+    """Return a topic of numbers with a name each, given with their units."""
     fields = {key: Field(f"position[{i}]", unit) for i, (key, unit) in enumerate(units.items())}
     return Topic(name, JOINT_STATE, publisher, every, quality, fields, tuple(units))
 
@@ -110,7 +116,7 @@ BOOM_DEFLECTION = Topic(
     ("boom_tip",),
     "boom1",
 )
-TRUTH = _named_numbers(
+TRUTH = named_numbers(
     "truth", "plant_node", "plant",
     {
         "true_angle": "rad", "true_tip_angle": "rad", "true_stroke": "m", "true_velocity": "m/s",
@@ -132,14 +138,14 @@ CYLINDER_REFERENCE = Topic(
     ("cylinder1",),
     "cylinder1",
 )
-CYLINDER_PREVIEW = _named_numbers(  # paper 3.3: N = 20 control periods
+CYLINDER_PREVIEW = named_numbers(  # paper 3.3: N = 20 control periods
     "cylinder_preview",
     "trajectory_node",
     "control",
     {f"reference_stroke_{k}_ahead": "m" for k in range(1, 21)},
     "command",
 )
-CYLINDER_MOVE = _named_numbers(
+CYLINDER_MOVE = named_numbers(
     "cylinder_move",
     "trajectory_node",
     "control",
@@ -167,7 +173,7 @@ OFFERED_COMMANDS = {
     )
     for name in OUTER_LOOPS
 }  # fmt: skip
-SELECTOR_TERMS = _named_numbers(
+SELECTOR_TERMS = named_numbers(
     "selector/terms",
     "selector_node",
     "control",
@@ -185,7 +191,7 @@ VALVE_COMMAND = Topic(
     "cylinder1",
     ("lqg_node", "mpc_node"),
 )
-CASCADE_TERMS = _named_numbers(
+CASCADE_TERMS = named_numbers(
     "cascade/terms",
     "cascade_node",
     "control",
@@ -199,21 +205,21 @@ def _pfc_terms(name: str, output_unit: str) -> Topic:
     )
     terms |= {"model_error": output_unit, "limited": "1"}
     units = {f"{name}_{term}": unit for term, unit in terms.items()}
-    return _named_numbers(f"{name}/terms", f"{name}_node", "control", units)
+    return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
 
 
 def _lqg_terms(name: str) -> Topic:
     terms = dict.fromkeys(("planned", "wanted", "flow"), "m/s")
     terms |= {"force": "N", "payload": "kg", "deflection": "m"}
     units = {f"{name}_{term}": unit for term, unit in terms.items()}
-    return _named_numbers(f"{name}/terms", f"{name}_node", "control", units)
+    return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
 
 
 LQG_TERMS = _lqg_terms("lqg")
 MPC_TERMS = _lqg_terms("mpc")
 PFC_TERMS = _pfc_terms("pfc", "m")
 PFC_TIP_TERMS = _pfc_terms("pfc_tip", "rad")
-FORCE_LOOP_TERMS = _named_numbers(
+FORCE_LOOP_TERMS = named_numbers(
     "force_loop/terms",
     "force_loop_node",
     "control",
@@ -230,6 +236,6 @@ TOPICS: tuple[Topic, ...] = (
 RECORDED = "recorder/recorded"  # std_msgs/Header: all up to this stamp is in the file (lock step)
 
 
-def by_name(name: str) -> Topic:
+def by_name(name: str, table: tuple[Topic, ...] = TOPICS) -> Topic:
     """Return the topic of a relative name; raises KeyError for a name not in the table."""
-    return {topic.name: topic for topic in TOPICS}[name]
+    return {topic.name: topic for topic in table}[name]

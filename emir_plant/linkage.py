@@ -36,3 +36,19 @@ def angle(stroke: float, p: Any) -> float:
     a, b = p.triangle_a, p.triangle_b
     length = cylinder_length(0.0, p) + stroke
     return math.acos((a * a + b * b - length * length) / (2.0 * a * b)) - p.triangle_gamma0
+
+
+def reach(p: Any) -> tuple[float, float]:
+    """Return the lowest and highest boom angle, rad.
+
+    Between the triangle's dead points, where foot, joint and rod eye are in line and the piston
+    moves nothing, and as far as both chambers hold oil.
+    """
+    low, high = -p["triangle_gamma0"], math.pi - p["triangle_gamma0"]
+    retracted = -p["volume_lifting_0"] / p["area_lifting"]
+    extended = p["volume_lowering_0"] / p["area_lowering"]
+    if stroke(low, p) < retracted:
+        low = angle(retracted, p)
+    if stroke(high, p) > extended:
+        high = angle(extended, p)
+    return low, high

@@ -12,6 +12,7 @@ from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
 
 GRAVITY = 9.81  # m/s^2
+RATED_PAYLOAD = 1500.0  # kg, paper 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +128,14 @@ class Machine:
     def __post_init__(self) -> None:
         for path, group in groups(self).items():
             check_ranges(group, path + ".")
+
+
+def cautions(machine: Machine) -> list[str]:
+    """Return a line for each value that is allowed but beyond what the machine is made for."""
+    load = machine.geometry.payload + machine.effects.payload.mass
+    if load <= RATED_PAYLOAD:
+        return []
+    return [f"warning: payload = {load:g} kg: the machine is made for {RATED_PAYLOAD:g} kg"]
 
 
 def groups(machine: Machine) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core
+from emir_plant import core, linkage
 from emir_plant.core import Array, Truth
 from emir_plant.effects import backlash, command_delay, external_load, linkage_error
 from emir_plant.hydraulics import logic_block
@@ -40,9 +40,16 @@ class Plant:
         """Return the state at rest at t = 0, both chambers shut, at the boom angle, rad.
 
         pressure_lowering: p_S, Pa, the tank's when not given; p_H follows from the balance of
-        forces. Raises SimulationError where the cylinder cannot hold the boom.
+        forces. Raises SimulationError where the linkage does not reach or the cylinder cannot
+        hold the boom.
         """
         p = self.record[0]
+        lowest, highest = linkage.reach(p)
+        if not lowest < angle < highest:
+            raise SimulationError(
+                f"boom angle {math.degrees(angle):.1f} deg: outside the linkage's reach,"
+                f" {math.degrees(lowest):.1f} ... {math.degrees(highest):.1f} deg"
+            )
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
         load = p["mode_weight"] * math.cos(angle) - p["mode_tip"] * external_load.force(0.0, p)
         torque = load[0] / p["mode_joint"][0]

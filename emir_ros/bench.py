@@ -207,7 +207,7 @@ def _busy_processors() -> Iterator[None]:
             process.wait()
 
 
-def _recorder(bag: Path, seconds: float) -> Part:
+def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
     """Send messages to a recorder of its own process and count what it has recorded."""
     words = ["--ros-args", "-p", f"bag:={bag}", "-p", f"topics:=[{JOINT_STATES.name}]"]
     recorder = subprocess.Popen(  # noqa: S603 (our own node)
@@ -223,7 +223,7 @@ def _recorder(bag: Path, seconds: float) -> Part:
         time.sleep(0.01)
     begin = time.monotonic()
     while (now := time.monotonic() - begin) < seconds:
-        while sent < now * RECORDED_RATE:
+        while sent < now * rate:
             publisher.publish(wire.encode(time.time_ns(), {"angle": 0.0}))
             sent += 1
         time.sleep(1e-4)

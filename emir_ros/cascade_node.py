@@ -1,10 +1,13 @@
-"""cascade_node: conventional position control of the piston, law (11)."""
+"""cascade_node: conventional position control of the piston, law (11), or of all six."""
 
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import CascadeControl
+from emir_analysis.node_controls import CascadeControl, Stepping
+from emir_analysis.robot_controls import RobotCascadeControl
+from emir_analysis.robot_setup import cascade_parameters
 from emir_control.cascade import Cascade, CascadeParameters
+from emir_msgs_py.topics import ROBOT
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
@@ -14,10 +17,11 @@ class CascadeNode(ControlNode):
     """cylinder_reference, cylinder_states -> velocity_command, cascade/terms."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("cascade_node", CascadeControl.inputs, CascadeControl.outputs, arguments)
-        self.law = self.standing_by(
-            CascadeControl(Cascade(declare_tree(self, CascadeParameters())))
-        )
+        mine, six = CascadeControl, RobotCascadeControl
+        super().__init__("cascade_node", mine.inputs, mine.outputs, arguments, six)
+        robot = self.model == ROBOT
+        law = Cascade(declare_tree(self, cascade_parameters() if robot else CascadeParameters()))
+        self.law: Stepping = six(law) if robot else self.standing_by(mine(law))
         self.state: Any = None
         reject_unknown(self)
 

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
+from emir_analysis.node_controls import ForceLoopControl, NodeControl, force_loop_signals
+from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
+from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT
 from emir_ros.main import run
-from emir_ros.node_parameters import declare_tree, reject_unknown
+from emir_ros.node_parameters import declare_robot, declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
 
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
@@ -19,16 +21,21 @@ TIMEOUT = 2e-9 * (CONTROL_PERIOD_NS - PLANT_PERIOD_NS // 2)  # s
 class ForceLoopNode(ControlNode):
     """velocity_command, joint_states, pressures -> valve_command, force_loop/terms.
 
-    Without fresh inputs it shuts the valve, within a control period.
+    Without fresh inputs it shuts the valve, within a control period. Of the whole robot it has six
+    loops.
     """
 
     consequence = "valve shut"
+    timeout = TIMEOUT
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__(
-            "force_loop_node", ForceLoopControl.inputs, ForceLoopControl.outputs, arguments, TIMEOUT
-        )
-        self.law = ForceLoopControl(ForceLoop(declare_tree(self, ForceLoopParameters())))
+        mine, six = ForceLoopControl, RobotForceLoopControl
+        super().__init__("force_loop_node", mine.inputs, mine.outputs, arguments, six)
+        self.law: NodeControl
+        if self.model == ROBOT:
+            self.law = six(declare_tree(self, force_loops(declare_robot(self))))
+        else:
+            self.law = mine(ForceLoop(declare_tree(self, ForceLoopParameters())))
         self.state: Any = None
         reject_unknown(self)
         if not self.lockstep:
@@ -47,7 +54,7 @@ class ForceLoopNode(ControlNode):
     def stale(self, missing: Sequence[str]) -> Signals:
         """Return the command that shuts the valve; the damping starts anew afterwards."""
         self.state = None
-        return force_loop_signals(SHUT)
+        return shut_signals() if self.model == ROBOT else force_loop_signals(SHUT)
 
 
 def main() -> None:

@@ -10,13 +10,18 @@ from typing import Any
 
 import yaml
 
+from emir_analysis.robot_setup import Posture, path_parameters, trajectory
 from emir_analysis.switching import Selector, Switch
-from emir_common.parameter_tree import with_values
+from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 from emir_common.yaml_file import read_map
+from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_msgs_py.topics import OFFERED_COMMANDS, TOPICS
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
+from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS
+from emir_plant.robot import require_pinocchio
+from emir_plant.robot.sheet import robot
 
 VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
 CONTROLLERS: dict[str, tuple[str, ...]] = {
@@ -29,6 +34,10 @@ NODES = tuple(dict.fromkeys(  # each once
      "selector_node", "plant_node")
 ))  # fmt: skip
 EVERY_NODE = "/**"
+MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
+OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby")
+ROBOT_FILES = ("robot_file", "machine_file")
+ROBOT_CONTROLLERS = ("cascade",)
 
 
 @dataclass(frozen=True)
@@ -37,7 +46,7 @@ class Plan:
 
     controller: a key of CONTROLLERS. switches: to which others, and when; these run from the
     start as well, and hold their state ready. duration: s; None: as long as the trajectory takes.
-    params: ROS 2 parameter file, or None.
+    params: ROS 2 parameter file, or None. model: a key of MODELS.
     """
 
     bag: Path
@@ -46,6 +55,7 @@ class Plan:
     duration: float | None = None
     params: Path | None = None
     lockstep: bool = True
+    model: str = JOINT1
     switches: tuple[Switch, ...] = ()
 
     @property
@@ -66,16 +76,15 @@ class Plan:
         offered = () if self.switches else OFFERED_COMMANDS.values()
         return tuple(
             topic.name
-            for topic in TOPICS
+            for topic in MODELS[self.model]
             if topic not in offered and not set(topic.publishers).isdisjoint(self.nodes)
         )
 
 
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
+    _check_model(plan)
     for name in plan.controllers:
-        if name not in CONTROLLERS:
-            raise ParameterError(f"controller {name!r}: there are {', '.join(CONTROLLERS)}")
         if name in VALVE_CONTROLLERS and plan.switches:
             raise ParameterError(f"controller {name!r}: cannot be switched to or from")
     if plan.controller not in VALVE_CONTROLLERS:
@@ -92,16 +101,54 @@ def check(plan: Plan) -> None:
     duration(plan)
 
 
+def _check_model(plan: Plan) -> None:
+    if plan.model not in MODELS:
+        raise ParameterError(f"model {plan.model!r}: there are {', '.join(MODELS)}")
+    if plan.model == ROBOT:
+        require_pinocchio()
+    known = ROBOT_CONTROLLERS if plan.model == ROBOT else tuple(CONTROLLERS)
+    for name in plan.controllers:
+        if name not in known:
+            there = "the whole robot has" if plan.model == ROBOT else "there are"
+            raise ParameterError(f"controller {name!r}: {there} {', '.join(known)}")
+
+
 def duration(plan: Plan) -> float:
-    """Return how long the run takes, s."""
-    given = read_parameters(plan.params).get("trajectory_node", {})
-    own = {key: value for key, value in given.items() if key not in ("trajectory", "lockstep")}
+    """Return how long the run takes, s. Raises ParameterError for a trajectory that cannot be."""
+    given = read_parameters(plan.params)
+    own = {k: v for k, v in given.get("trajectory_node", {}).items() if k not in OF_EVERY_NODE}
+    where = f"{plan.params}: trajectory_node: " if own else ""
     try:
-        trajectory = named(plan.trajectory, with_values(TrajectoryParameters(), own))
+        if plan.model == ROBOT:
+            takes = _robot_trajectory(plan, given, own)
+        else:
+            takes = _trajectory(plan, own)
     except ParameterError as error:
-        where = f"{plan.params}: trajectory_node: " if own else ""
         raise ParameterError(f"{where}{error}") from None
-    return trajectory.duration if plan.duration is None else plan.duration
+    return takes if plan.duration is None else plan.duration
+
+
+def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
+    """Return how long joint 1's trajectory takes, s."""
+    return named(plan.trajectory, with_values(TrajectoryParameters(), own)).duration
+
+
+def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
+    """Return how long the robot's trajectory takes, s, from where it is to start."""
+    files = (Path(name) if name else None for name in (own.pop(key, "") for key in ROBOT_FILES))
+    sheet = robot(*files)
+    path = path_parameters(sheet)
+    of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
+    move = with_values(TrajectoryParameters(), own)
+    planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
+    front = "initial_angles."
+    angles = {
+        name.removeprefix(front): value
+        for name, value in given.get("plant_node", {}).items()
+        if name.startswith(front)
+    }
+    start = RobotTrajectoryInputs(with_values(Posture(), angles).angles)
+    return planned.initial(start).timing.duration
 
 
 def read_parameters(file: Path | None) -> dict[str, dict[str, Any]]:
@@ -142,7 +189,7 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
 
 def _run_parameters(plan: Plan) -> dict[str, Any]:
     nodes: dict[str, dict[str, Any]] = {
-        EVERY_NODE: {"lockstep": plan.lockstep},
+        EVERY_NODE: {"lockstep": plan.lockstep, "model": plan.model},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
         "trajectory_node": {"trajectory": plan.trajectory},
         "recorder_node": {
@@ -177,6 +224,7 @@ def _selector_parameters(plan: Plan) -> dict[str, Any]:
 def _description(plan: Plan) -> dict[str, str]:
     return {
         "software": f"emir {software_version()}",
+        "model": plan.model,
         "controller": ", then ".join(
             [plan.controller, *(f"{s.name} from {s.time:g} s" for s in plan.switches)]
         ),

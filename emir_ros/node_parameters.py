@@ -12,18 +12,21 @@ from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError, Quantity
 from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
+from emir_plant.robot.parameters import Robot
+from emir_plant.robot.sheet import robot
 
 Tree = TypeVar("Tree")
 
 
-def declare_tree(node: Node, tree: Tree) -> Tree:
+def declare_tree(node: Node, tree: Tree, without: str = "") -> Tree:
     """Declare every quantity of the dataclass as a ROS parameter; return it as then set.
 
-    Raises ParameterError, naming node and parameter, for a value that is out of range.
+    without: what the parameters' names leave out of the front of the quantities' paths. Raises
+    ParameterError, naming node and parameter, for a value that is out of range.
     """
     values = {}
     for path, (about, default) in declared(tree).items():
-        value = declare(node, path, default, describe(about))
+        value = declare(node, path.removeprefix(without), default, describe(about))
         if value != default:
             values[path] = value
     try:
@@ -32,15 +35,25 @@ def declare_tree(node: Node, tree: Tree) -> Tree:
         raise ParameterError(f"{node.get_name()}: {error}") from None
 
 
+def declare_robot(node: Node) -> Robot:
+    """Declare the files of the robot's sheet and return what they say.
+
+    Raises ParameterError, naming file and key.
+    """
+    main = declare(node, "machine_file", "", "YAML of the main joint; empty: EMIR's joint 1")
+    file = declare(node, "robot_file", "", "YAML of the robot beyond that; empty: EMIR")
+    return robot(Path(file) if file else None, Path(main) if main else None)
+
+
 def declare_pfc(node: Node, output: str) -> PfcParameters:
     """Declare a predictive controller's design file and, on top of it, its tuning.
 
     Raises ParameterError, naming node and parameter or file.
     """
-    about = "YAML made by emir design; empty: the one that comes with the project"
+    about = "YAML made by emir design; empty or `scheduled`: those that come with the project"
     file = declare(node, "model_file", "", about)
     try:
-        design = pfc_file.load(Path(file) if file else pfc_file.default_file(output), output)
+        design = pfc_file.load(pfc_file.find(file, output), output)
         design = replace(
             design,
             form=declare(node, "form", design.form, ", ".join(get_args(Form))),

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from emir_analysis.node_controls import PfcControl
-from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE
+from emir_control.scheduled_pfc import law_of
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, reject_unknown
 from emir_ros.shell import ControlNode, Signals
@@ -16,7 +16,7 @@ class PfcNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("pfc_node", PfcControl.inputs, PfcControl.outputs, arguments)
-        self.law = self.standing_by(PfcControl(Pfc(declare_pfc(self, STROKE))))
+        self.law = self.standing_by(PfcControl(law_of(declare_pfc(self, STROKE))))
         self.state: Any = None
         reject_unknown(self)
 

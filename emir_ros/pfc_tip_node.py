@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from emir_analysis.node_controls import PfcTipControl
-from emir_control.pfc import Pfc
 from emir_control.pfc_file import TIP_ANGLE
+from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, reject_unknown
@@ -17,7 +17,7 @@ class PfcTipNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("pfc_tip_node", PfcTipControl.inputs, PfcTipControl.outputs, arguments)
-        self.law = self.standing_by(PfcTipControl(Tip(Pfc(declare_pfc(self, TIP_ANGLE)))))
+        self.law = self.standing_by(PfcTipControl(Tip(law_of(declare_pfc(self, TIP_ANGLE)))))
         self.state: Any = None
         reject_unknown(self)
 

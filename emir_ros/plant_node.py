@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -13,45 +13,23 @@ from std_msgs.msg import Header
 
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import (
-    BOOM_DEFLECTION,
-    CONTROL_PERIOD_NS,
-    CYLINDER_STATES,
-    JOINT_STATES,
-    PLANT_PERIOD_NS,
-    PRESSURE_LIFTING,
-    PRESSURE_LOWERING,
-    RECORDED,
-    TRUTH,
-    VALVE_COMMAND,
-)
-from emir_plant.plant import Plant
-from emir_plant.sensors import measure
-from emir_plant.sheet import joint1, load_sheet
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, RECORDED, ROBOT
 from emir_ros import qos
 from emir_ros.diagnostics import Level
+from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachine
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
-from emir_ros.shell import NodeError, Shell
+from emir_ros.shell import NodeError, Shell, Signals
 from emir_ros.wire import Wire, stamp_ns
 
-OUTPUTS = [
-    JOINT_STATES,
-    CYLINDER_STATES,
-    PRESSURE_LIFTING,
-    PRESSURE_LOWERING,
-    BOOM_DEFLECTION,
-    TRUTH,
-]
-TRUTH_SIGNALS = tuple(TRUTH.fields)  # in the order of emir_plant.core.Truth; a test holds that
+ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlantNodeParameters:
     """How the machine starts and how long it runs."""
 
-    initial_angle: float = quantity("rad", -0.5, 1.6, "boom angle at the start",
-                                    default=math.pi / 4)  # fmt: skip
     initial_pressure_lowering: float = quantity(
         "Pa", 0.0, 3e7, "p_S at the start; p_H follows from the load", default=2e6
     )
@@ -71,38 +49,43 @@ class PlantNode(Shell):
     """valve_command -> sensors, truth, and in lock step /clock."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("plant_node", OUTPUTS, arguments)
+        super().__init__("plant_node", JOINT1_OUTPUTS, arguments, ROBOT_OUTPUTS)
+        robot = self.model == ROBOT
         self.own = declare_tree(self, PlantNodeParameters())
-        sheet = declare(self, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
-        base = load_sheet(Path(sheet)).machine if sheet else joint1()
-        self.plant = Plant(declare_tree(self, base))
+        kind: Any = RobotMachine if robot else Joint1Machine
+        self.machine: Machine = kind(self, self.own.initial_pressure_lowering)
+        self._topics = ROBOT_OUTPUTS if robot else JOINT1_OUTPUTS
         self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
         reject_unknown(self)
-        start = self.own.initial_angle, self.own.initial_pressure_lowering
-        self.state = self.plant.initial(*start)
-        self.truth = self.plant.outputs(self.state)
         self.tick = 0
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
         self._said = time.monotonic()
-        self._command: tuple[int, float] | None = None
+        self._valves = self.machine.command
+        self._shut: Signals = dict.fromkeys(self._valves.fields, 0.0)
+        self._command: tuple[int, Signals] | None = None
         self._recorded = -1
-        profile = qos.requested(VALVE_COMMAND, lockstep=self.lockstep)
-        kind = conversions.message_class(VALVE_COMMAND.type)
-        self._command_wire = Wire(VALVE_COMMAND)
-        self.create_subscription(kind, VALVE_COMMAND.name, self._on_command, profile, raw=True)
+        profile = qos.requested(self._valves, lockstep=self.lockstep)
+        message = conversions.message_class(self._valves.type)
+        self._command_wire = Wire(self._valves)
+        name = self._valves.name
+        self.create_subscription(message, name, self._on_command, profile, raw=True)
         if self.lockstep:
             self._start_lockstep()
         else:
             self._start_realtime()
 
-    def _step(self, command: float) -> None:
-        self.state, self.truth = self.plant.step(self.state, command, PLANT_PERIOD_NS * 1e-9)
+    @property
+    def plant(self) -> Any:
+        """Return the simulated machine itself: Plant or RobotPlant."""
+        return self.machine.plant
+
+    def _step(self, command: Signals) -> None:
+        self.machine.step(command, PLANT_PERIOD_NS * 1e-9)
         self.tick += 1
 
     def _publish_sensors(self, stamp: int) -> None:
-        reading = measure(self.plant, self.truth, self.tick, self.state)
-        signals = reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
-        for topic in OUTPUTS:
+        signals = self.machine.signals(self.tick)
+        for topic in self._topics:
             self.publish(topic, stamp, signals)
 
     def _show_progress(self) -> None:
@@ -115,7 +98,7 @@ class PlantNode(Shell):
         last = round(self.own.duration * 1e9 / CONTROL_PERIOD_NS) * CONTROL_PERIOD_NS
         return self.own.duration > 0.0 and self.tick * PLANT_PERIOD_NS >= last
 
-    # lock step: publish stamp t, wait for the answers to t, step to the next control period
+    # lock step: publish stamp t, wait for the answers to t, step until the next is due
 
     def _start_lockstep(self) -> None:
         self._clock_publisher = self.create_publisher(
@@ -142,12 +125,13 @@ class PlantNode(Shell):
         now = self.tick * PLANT_PERIOD_NS
         if self._command is None or self._command[0] != now:
             return
-        if self._recorder and self._recorded < now:
+        if self._recorder and self._recorded < now - now % CONTROL_PERIOD_NS:
             return
         if self._is_over():
             self.done = True
             return
-        for _ in range(CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
+        fast = self._valves.every == "plant"
+        for _ in range(1 if fast else CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
             self._step(self._command[1])
             self._publish_tick()
         self._asked = time.monotonic()
@@ -158,10 +142,10 @@ class PlantNode(Shell):
             return
         now = self.tick * PLANT_PERIOD_NS
         answered = self._command is not None and self._command[0] == now
-        what = RECORDED if answered else VALVE_COMMAND.name
+        what = RECORDED if answered else self._valves.name
         raise NodeError(
             f"plant_node: no {what} for t = {now * 1e-9:.3f} s within {self.own.patience:g} s:"
-            f" is {'recorder_node' if answered else VALVE_COMMAND.publisher} (and what it"
+            f" is {'recorder_node' if answered else self._valves.publisher} (and what it"
             " listens to) running?"
         )
 
@@ -186,19 +170,21 @@ class PlantNode(Shell):
         self._show_progress()
         self.done = self._is_over()
 
-    def _fresh_command(self) -> float:
+    def _fresh_command(self) -> Signals:
         if self._command is None:
-            return 0.0
+            return self._shut
         if time.monotonic() - self._command_received > self.own.command_timeout:
-            self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {VALVE_COMMAND.name}")
-            return 0.0
+            self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {self._valves.name}")
+            return self._shut
         return self._command[1]
 
     def _on_command(self, data: bytes) -> None:
-        command = self._command_wire.decode(data)["valve_command"]
-        if not math.isfinite(command):
-            self.diagnostics.say(Level.ERROR, f"valve shut: {VALVE_COMMAND.name} is {command}")
-            command = 0.0
+        command = self._command_wire.decode(data)
+        bad = {name: value for name, value in command.items() if not math.isfinite(value)}
+        if bad:
+            told = ", ".join(f"{name} is {value}" for name, value in bad.items())
+            self.diagnostics.say(Level.ERROR, f"valve shut: {told}")
+            command |= dict.fromkeys(bad, 0.0)
         else:
             self.diagnostics.say(Level.OK, "running")
         self._command = (stamp_ns(data), command)

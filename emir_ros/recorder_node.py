@@ -25,10 +25,12 @@ from emir_analysis.rosbag2_writer import (
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.meanings import field_table
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     PLANT_PERIOD_NS,
     RECORDED,
+    ROBOT,
     TOPICS,
     Topic,
     by_name,
@@ -50,15 +52,16 @@ class RecorderNode(Shell):
     """Every topic of the table (or those named) -> recording, recorder/recorded."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("recorder_node", [], arguments)
-        everything = [topic.name for topic in TOPICS]
+        super().__init__("recorder_node", [], arguments, [])
+        self._table = ROBOT_TOPICS if self.model == ROBOT else TOPICS
+        everything = [topic.name for topic in self._table]
         folder: str = declare(self, "bag", "", "folder of the recording, must not exist")
         names: list[str] = declare(self, "topics", everything, "topics to record")
         about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
         nodes: list[str] = declare(self, "nodes", [""], "nodes whose parameters are recorded")
         writer = self._make_writer(folder)
         reject_unknown(self)
-        self._topics = [_known(name) for name in names]
+        self._topics = [_known(name, self._table) for name in names]
         self._plant_topics = [topic for topic in self._topics if topic.every == "plant"]
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
         self._writer = writer()
@@ -177,9 +180,9 @@ class RecorderNode(Shell):
         self._ack.publish(message)
 
 
-def _known(name: str) -> Topic:
+def _known(name: str, table: tuple[Topic, ...]) -> Topic:
     try:
-        return by_name(name)
+        return by_name(name, table)
     except KeyError:
         raise ParameterError(f"recorder_node: topics: {name!r} is not a topic of EMIR") from None
 

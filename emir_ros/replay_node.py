@@ -47,7 +47,7 @@ class ReplayNode(Shell):
     """A recording -> its topics, /clock. Service ~/pause (std_srvs/SetBool); parameter `rate`."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("replay_node", [], arguments)
+        super().__init__("replay_node", [], arguments, [])
         bag: str = declare(self, "bag", "", "recording to replay: a folder or an .mcap file")
         chosen: list[str] = declare(self, "topics", [""], "full names to replay; empty: all")
         self._paused: bool = declare(self, "start_paused", False, "wait for ~/pause false")

@@ -19,11 +19,12 @@ from emir_analysis.run_report import analyze, text
 from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
-from emir_ros.graph import CONTROLLERS, Plan, check, ros_arguments
+from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
 from emir_ros.main import make_executor, start_ros
 from emir_ros.shell import NodeError, Shell
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
+TRAJECTORIES = "lift-lower, lower-lift, hold; of the robot also line"
 GRACE = 10.0  # s that a node has to end before it is killed
 
 
@@ -37,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         duration=options.duration,
         params=options.params,
         lockstep=not options.realtime,
+        model=options.model,
     )
     try:
         plan = replace(plan, switches=tuple(map(_switch, options.switch)))
@@ -52,12 +54,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
+    parser.add_argument("--model", default="joint1", help=", ".join(MODELS))
     parser.add_argument("--controller", default="cascade", help=", ".join(CONTROLLERS))
     parser.add_argument(
         "--switch", action="append", default=[], metavar="S=NAME",
         help="to which controller at what time, while it moves; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--trajectory", default="lift-lower", help="lift-lower, lower-lift, hold")
+    parser.add_argument("--trajectory", default="lift-lower", help=TRAJECTORIES)
     parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
     pace = parser.add_mutually_exclusive_group()

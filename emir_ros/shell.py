@@ -16,10 +16,14 @@ from rclpy.node import Node
 
 from emir_analysis.node_controls import NodeControl, Stepping
 from emir_analysis.switching import Ready
+from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    JOINT1,
     OFFERED_COMMANDS,
+    PLANT_PERIOD_NS,
+    ROBOT,
     SELECTOR_TERMS,
     VELOCITY_COMMAND,
     Topic,
@@ -41,20 +45,30 @@ class NodeError(RuntimeError):
 
 
 class Shell(Node):
-    """A node with the graph's common parameter `lockstep` and its publishers.
+    """A node with the graph's common parameters `lockstep` and `model`, and its publishers.
 
-    arguments: ROS arguments of this node alone, beside those of the process.
+    outputs: of joint 1's model. robot: those of the whole robot's, where the node knows that.
+    arguments: ROS arguments of this node alone, beside those of the process. Raises
+    ParameterError for a model that the node does not know.
     """
 
     def __init__(
-        self, name: str, outputs: Sequence[Topic], arguments: Sequence[str] | None = None
+        self,
+        name: str,
+        outputs: Sequence[Topic],
+        arguments: Sequence[str] | None = None,
+        robot: Sequence[Topic] | None = None,
     ) -> None:
-        self.failure: NodeError | SimulationError | None = None
+        self.failure: NodeError | ParameterError | SimulationError | None = None
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
+        known = {JOINT1: outputs} | ({} if robot is None else {ROBOT: robot})
+        self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
+        if self.model not in known:
+            raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
         self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
-        self._offer(outputs)
+        self._offer(known[self.model])
         self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
@@ -95,7 +109,7 @@ class Shell(Node):
         """Call back; keep a failure from the executor, which would print a traceback."""
         try:
             callback(*args)
-        except (NodeError, SimulationError) as error:
+        except (NodeError, ParameterError, SimulationError) as error:
             self.failure = self.failure or error
 
     def check(self) -> None:
@@ -119,15 +133,17 @@ class Shell(Node):
 class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
-    A subclass implements `control`; `stale` says what to do without fresh inputs. timeout: s, by
-    default, after which an input is stale. A command that two nodes publish counts as missing:
-    nobody knows which of them to obey.
+    A subclass implements `control`; `stale` says what to do without fresh inputs. A command
+    that two nodes publish counts as missing: nobody knows which of them to obey. The node acts as
+    often as its first output is to come. robot: whose inputs and outputs it has when the model is
+    the whole robot.
 
     A node that commands the piston's velocity has the parameter `standby`: it then offers its
     command to selector_node, which tells it what was applied, and holds its state ready.
     """
 
     consequence = "no output"  # of missing inputs, in words
+    timeout = 0.1  # s, by default, after which an input is stale
 
     def __init__(
         self,
@@ -135,13 +151,18 @@ class ControlNode(Shell):
         inputs: Sequence[Topic],
         outputs: Sequence[Topic],
         arguments: Sequence[str] | None = None,
-        timeout: float = 0.1,
+        robot: type[NodeControl] | None = None,
     ) -> None:
-        super().__init__(name, [], arguments)
+        super().__init__(name, [], arguments, None if robot is None else [])
+        if robot is not None and self.model == ROBOT:
+            inputs, outputs = robot.inputs, robot.outputs
+        fast = outputs[0].every == "plant"
+        self._period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
+        self._held: dict[str, Signals] = {}  # what comes less often than this node acts
         self._own = name.removesuffix("_node")
         self._inputs: dict[str, Topic] = {}
         about = "an older input is stale [s], real time"
-        self._timeout = Duration(seconds=declare(self, "input_timeout", timeout, about))
+        self._timeout = Duration(seconds=declare(self, "input_timeout", self.timeout, about))
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
         self._last_stamp = -1
@@ -155,7 +176,7 @@ class ControlNode(Shell):
                 self._hear_selector()
         self._offer(outputs)
         if not self.lockstep:
-            self.start_timer(CONTROL_PERIOD_NS * 1e-9, self._on_timer)
+            self.start_timer(self._period * 1e-9, self._on_timer)
 
     def standing_by(self, control: NodeControl) -> Stepping:
         """Return the controller as this node shall hold it: alone, or one of several."""
@@ -184,13 +205,12 @@ class ControlNode(Shell):
     def take(self, topic: Topic, later: int = 0) -> None:
         """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
         self._inputs[topic.name] = topic
-
         wire = Wire(topic)
 
         def receive(data: bytes) -> None:
             if not self.lockstep:
                 self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
-            elif stamp_ns(data) % CONTROL_PERIOD_NS == 0:
+            elif stamp_ns(data) % self._period == 0:
                 self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
 
         kind = conversions.message_class(topic.type)
@@ -205,10 +225,16 @@ class ControlNode(Shell):
                 " does more than one node publish it?"
             )
         complete[topic.name] = signals
-        if len(complete) == len(self._inputs):
+        if len(complete) == self._expected(stamp):
             del self._pending[stamp]
             self._last_stamp = stamp
-            self._run(stamp, complete.values())
+            self._held |= complete
+            self._run(stamp, self._held.values())
+
+    def _expected(self, stamp: int) -> int:
+        """Return how many of the inputs have messages of that stamp."""
+        controlled = stamp % CONTROL_PERIOD_NS == 0
+        return sum(controlled or topic.every == "plant" for topic in self._inputs.values())
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()
@@ -247,7 +273,7 @@ class ControlNode(Shell):
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
-        self._publish_all(stamp, self.control(signals, CONTROL_PERIOD_NS * 1e-9))
+        self._publish_all(stamp, self.control(signals, self._period * 1e-9))
         bad = [name for name, value in signals.items() if not math.isfinite(value)]
         if bad:
             verb = "is" if len(bad) == 1 else "are"

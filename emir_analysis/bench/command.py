@@ -24,7 +24,14 @@ def plant(seconds: float) -> Iterator[tuple[str, list[Figure]]]:
     yield from robot_figures(seconds)
 
 
-PARTS: dict[str, Part] = {"plant": plant}
+def control(seconds: float) -> Iterator[tuple[str, list[Figure]]]:
+    """Yield titles and figures of the controllers."""
+    from emir_analysis.bench.control import control_figures  # noqa: PLC0415 (as above)
+
+    yield from control_figures(seconds)
+
+
+PARTS: dict[str, Part] = {"plant": plant, "control": control}
 
 
 def command(options: argparse.Namespace, show: Callable[[str], None]) -> None:

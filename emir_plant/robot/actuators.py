@@ -24,7 +24,7 @@ from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled
 from emir_plant.parameters import Machine
 from emir_plant.record import record
-from emir_plant.robot.parameters import Drive, Robot
+from emir_plant.robot.parameters import Joint, Robot
 from emir_plant.robot.reach import Reach
 
 Array = NDArray[np.float64]
@@ -32,9 +32,10 @@ Array = NDArray[np.float64]
 ACTUATORS = 6
 EACH = 5  # states of an actuator
 SIZE = 1 + ACTUATORS * EACH
+NO_LIMIT = 1e9  # Pa
 SUPPLY = 0  # index of the supply pressure
 
-EFFECTS = (  # those without a memory of their own, on joint 1
+EFFECTS = (  # those without a memory of their own
     "coulomb_friction",
     "stribeck_friction",
     "viscous_friction",
@@ -56,19 +57,27 @@ PRESSURE, FLOW, SLOPE, STIFFNESS = 0, 1, 2, 3  # of `pump_record`
 def machines(robot: Robot, reaches: tuple[Reach, ...]) -> tuple[Machine, ...]:
     """Return base and joints 1-5, each as a main joint of its own size.
 
-    Effects act on joint 1, as in its own model, the payload on all. Raises ParameterError for an
-    effect that is switched on and has no place here.
+    Effects act on the joint that they are stated for, the main joint's payload on all. Raises
+    ParameterError for an effect that is switched on and has no place here.
     """
-    effects = robot.main.effects
-    for name, kind in REGISTRY.items():
-        on = any(getattr(getattr(effects, name), size) != 0.0 for size in kind.sizes)
-        if on and name not in EFFECTS:
-            raise ParameterError(f"effects.{name}: not in the model of the whole robot")
+    _check_effects(robot.main.effects, EFFECTS, "")
+    for name, effects in robot.effects.items():
+        _check_effects(effects, tuple(e for e in EFFECTS if e != "payload"), f"{name}.")
     others = (
-        _scaled(robot.main, joint.drive, reach)
+        _scaled(robot.main, joint, reach)
         for joint, reach in zip(robot.four_bars, reaches[1:], strict=True)
     )
     return (_motor(robot), robot.main, *others)
+
+
+def _check_effects(effects: Effects, allowed: tuple[str, ...], where: str) -> None:
+    for name, kind in REGISTRY.items():
+        on = any(getattr(getattr(effects, name), size) != 0.0 for size in kind.sizes)
+        if on and name not in allowed:
+            raise ParameterError(
+                f"{where}effects.{name}: not in the model of the whole robot; there are"
+                f" {', '.join(allowed)}"
+            )
 
 
 def records(robot: Robot, reaches: tuple[Reach, ...]) -> NDArray[Any]:
@@ -83,7 +92,8 @@ def pump_record(robot: Robot) -> Array:
     return np.array([main.supply.p0, pump.flow_max, slope, main.cylinder.beta / pump.line_volume])
 
 
-def _scaled(main: Machine, drive: Drive, reach: Reach) -> Machine:
+def _scaled(main: Machine, joint: Joint, reach: Reach) -> Machine:
+    drive = joint.drive
     lifting = math.pi * drive.bore**2 / 4.0
     lowering = lifting - math.pi * drive.rod**2 / 4.0
     values = {
@@ -92,8 +102,9 @@ def _scaled(main: Machine, drive: Drive, reach: Reach) -> Machine:
         "cylinder.volume_lifting_0": drive.dead_volume_lifting - lifting * reach.stroke_low,
         "cylinder.volume_lowering_0": drive.dead_volume_lowering + lowering * reach.stroke_high,
         "valve.flow_ratio_lowering": 1.1 * lowering / lifting,
+        "valve.limit_lowering": NO_LIMIT,  # folded, the weight pulls the other way
     }
-    return _valve_sized(main, drive.flow_nominal, values)
+    return _valve_sized(main, drive.flow_nominal, values, joint.effects)
 
 
 def _motor(robot: Robot) -> Machine:
@@ -104,12 +115,14 @@ def _motor(robot: Robot) -> Machine:
         "cylinder.volume_lifting_0": base.chamber,
         "cylinder.volume_lowering_0": base.chamber,
         "valve.flow_ratio_lowering": 1.0,
+        "valve.balance_lowering": 0,
+        "valve.limit_lowering": NO_LIMIT,
         "logic_block.threshold": 0.0,
     }
-    return _valve_sized(robot.main, base.flow_nominal, values)
+    return _valve_sized(robot.main, base.flow_nominal, values, base.effects)
 
 
-def _valve_sized(main: Machine, flow: float, values: dict[str, float]) -> Machine:
+def _valve_sized(main: Machine, flow: float, values: dict[str, float], effects: Effects) -> Machine:
     """Return the machine with a valve and lines that drop the main joint's pressures at `flow`."""
     share = (main.valve.flow_nominal / flow) ** 2
     values |= {
@@ -117,7 +130,7 @@ def _valve_sized(main: Machine, flow: float, values: dict[str, float]) -> Machin
         for field in dataclasses.fields(main.resistances)
     }
     values |= {"valve.flow_nominal": flow}
-    return with_values(dataclasses.replace(main, effects=Effects()), values)
+    return with_values(dataclasses.replace(main, effects=effects), values)
 
 
 @compiled

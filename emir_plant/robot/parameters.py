@@ -5,12 +5,14 @@ triangle, the boom's length, mass and bending springs, hydraulics, supply) in da
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
+from emir_plant.effects import Effects
 from emir_plant.parameters import Machine
 
 JOINTS = 5  # horizontal ones; paper 2.1
+FOUR_BARS = ("joint2", "joint3", "joint4", "joint5")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +68,7 @@ class Joint:
     linkage: Linkage
     parts: Parts
     drive: Drive
+    effects: Effects = field(default_factory=Effects)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +81,10 @@ class MainJoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Base:
-    """The rotating column and its hydraulic motor."""
+    """The rotating column and its hydraulic motor.
+
+    Its effects take N for N m, m for rad.
+    """
 
     column_mass: float = quantity("kg", 1.0, 1e5, "rotating column")
     column_inertia: float = quantity("kg m^2", 1.0, 1e6, "about the vertical axis")
@@ -86,6 +92,7 @@ class Base:
     displacement: float = quantity("m^3/rad", 1e-5, 1.0, "motor with gear, per angle of the base")
     chamber: float = quantity("m^3", 1e-5, 1.0, "each of the two equal chambers with lines")
     flow_nominal: float = quantity("m^3/s", 1e-6, 0.1, "into either chamber, fully open")
+    effects: Effects = field(default_factory=Effects)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +145,9 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_ranges(self.base, "base.")
+        for name, effects in self.effects.items():
+            for effect in fields(Effects):
+                check_ranges(getattr(effects, effect.name), f"{name}.effects.{effect.name}.")
         for name in ("arm", "pump", "end_stop"):
             check_ranges(getattr(self, name), f"{name}.")
         check_ranges(self.joint1, "joint1.")
@@ -159,6 +169,12 @@ class Robot:
     def four_bars(self) -> tuple[Joint, ...]:
         """The joints 2-5."""
         return (self.joint2, self.joint3, self.joint4, self.joint5)
+
+    @property
+    def effects(self) -> dict[str, Effects]:
+        """The effects of base and joints 2-5; those of joint 1 are the main joint's."""
+        others = zip(FOUR_BARS, self.four_bars, strict=True)
+        return {"base": self.base.effects} | {name: joint.effects for name, joint in others}
 
     @property
     def linkages(self) -> tuple[Linkage, ...]:

@@ -1,6 +1,11 @@
-"""Reading the robot from YAML: nested groups, each entry `name: {value, unit, source}`."""
+"""Reading the robot from YAML: nested groups, each entry `name: {value, unit, source}`.
+
+Effects of a joint are switched on by name: `joint3: {effects: {viscous_friction: {...}}, ...}`;
+those of joint 1 stand in its own file.
+"""
 
 import dataclasses
+from dataclasses import MISSING
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -9,12 +14,17 @@ from emir_common.quantity import ParameterError, quantities
 from emir_common.yaml_file import read_map
 from emir_plant.parameters import Machine
 from emir_plant.robot.parameters import Robot
-from emir_plant.sheet import joint1
+from emir_plant.sheet import EFFECTS, joint1, load_sheet
 
 
-def robot() -> Robot:
-    """Return the robot as the project states it (data/robot.yaml and data/joint1.yaml)."""
-    return load_robot(Path(str(files("emir_plant") / "data" / "robot.yaml")), joint1())
+def robot(file: Path | None = None, main: Path | None = None) -> Robot:
+    """Return the robot of two files, its own and its main joint's.
+
+    Without them it is EMIR as the project states it (data/robot.yaml and data/joint1.yaml).
+    Raises ParameterError as `load_robot` and `load_sheet`.
+    """
+    own = file or Path(str(files("emir_plant") / "data" / "robot.yaml"))
+    return load_robot(own, load_sheet(main).machine if main else joint1())
 
 
 def load_robot(path: Path, main: Machine) -> Robot:
@@ -36,14 +46,16 @@ def _group(kind: Any, content: Any, prefix: str, given: dict[str, Any] | None = 
     if not isinstance(content, dict):
         raise ParameterError(f"{prefix.rstrip('.') or 'file'}: no parameters in it")
     hints, declared = get_type_hints(kind), quantities(kind)
-    wanted = {field.name for field in dataclasses.fields(kind)} - values.keys()
+    fields = [field for field in dataclasses.fields(kind) if field.name not in values]
+    wanted = {field.name for field in fields}
+    stated = wanted & content.keys()
     for name in content.keys() - wanted:
         there = ", ".join(sorted(wanted))
         raise ParameterError(f"{prefix}{name}: there is no such parameter; there are {there}")
-    for name in sorted(wanted - content.keys()):
+    for name in sorted({field.name for field in fields if _needed(field)} - stated):
         allowed = f"; allowed is {declared[name].allowed}" if name in declared else ""
         raise ParameterError(f"{prefix}{name}: missing{allowed}")
-    for name in wanted:
+    for name in stated:
         path = prefix + name
         if name not in declared:
             values[name] = _group(hints[name], content[name], path + ".")
@@ -54,7 +66,14 @@ def _group(kind: Any, content: Any, prefix: str, given: dict[str, Any] | None = 
     return kind(**values)
 
 
+def _needed(field: dataclasses.Field[Any]) -> bool:
+    """Tell whether a file has to state a field; effects, for one, are off where it does not."""
+    return field.default is MISSING and field.default_factory is MISSING
+
+
 def _entry(entry: Any, path: str, unit: str) -> Any:
+    if EFFECTS in path and isinstance(entry, int | float):
+        return entry
     if not isinstance(entry, dict) or "value" not in entry:
         raise ParameterError(f"{path}: no value")
     if entry.get("unit", "1") != unit:

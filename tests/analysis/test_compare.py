@@ -1,16 +1,24 @@
 """The comparison's figures on signals whose figures are known, and what it shows of the paper."""
 
+import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from emir_analysis import damping
+from emir_analysis import damping, trade_off
 from emir_analysis.cli import main
 from emir_analysis.compare import MoveFigures, controllers, figures, run
 from emir_analysis.damping import damping_figures
+from emir_analysis.design_pfc import OperatingPoint
+from emir_analysis.margin import gain_margin, linear_machine
+from emir_analysis.outer_loop import PfcLoop
+from emir_control import pfc_file
+from emir_control.design import spectral_radius
 from emir_control.force_loop import ForceLoopParameters
+from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
@@ -37,6 +45,9 @@ def _known_run() -> dict[str, np.ndarray]:
         "true_velocity": speed(fine - 0.4),
         "true_angle": angle,
         "tcp_deflection": -0.25 * np.cos(angle) + swing,
+        "valve_command": np.where(speed(control) != 0.0, 0.5, 0.0) * np.sign(speed(control)),
+        "flow_lifting": 0.06 * speed(fine - 0.4),
+        "flow_lowering": -0.03 * speed(fine - 0.4),
     }
 
 
@@ -48,6 +59,12 @@ def test_figures_of_a_known_run() -> None:
     assert lift.up == pytest.approx(0.0, abs=1e-12)  # the sag of each posture is taken off
     assert lift.after == lift.settled == pytest.approx(0.03, rel=1e-3)
     assert lower.after == pytest.approx(0.0, abs=1e-12)
+    assert lift.settling == pytest.approx(3.0, abs=0.1)  # the swing ends 3 s after the stop
+    assert lower.settling == 0.0
+    assert lift.travel == lower.travel == pytest.approx(1.0)  # to 0.5 and back
+    assert lift.oil == pytest.approx(0.06 * 0.06, rel=0.01)  # 60 mm, what comes back is not counted
+    assert lower.oil == pytest.approx(0.03 * 0.06, rel=0.01)
+    assert lift.error_rms == pytest.approx(0.008 * math.sqrt(2.85 / 8.6), rel=0.05)
 
 
 @pytest.fixture(scope="module")
@@ -115,19 +132,71 @@ def test_damping_is_seen_in_the_machines_swing_after_a_stop() -> None:
 
 def test_compare_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     image = tmp_path / "compare.png"
-    words = ["--controllers", "cascade", "pfc, preview", "--picture", str(image)]
+    words = ["--angle", "45", "--controllers", "cascade", "pfc, preview"]
+    words += ["--picture", str(image)]
     assert main(["compare", *words]) == 0
     out = capsys.readouterr().out
     assert out.count("| lift |") == out.count("| lower |") == 2
     assert image.read_bytes().startswith(b"\x89PNG")
-    assert main(["compare", "--repeat", "2", "--controllers", "pfc, preview"]) == 0
-    assert capsys.readouterr().out.count(" \u00b1 ") == 2 * 7
+    assert main(["compare", "--size", "20", "--repeat", "2", "--controllers", "pfc, preview"]) == 0
+    assert capsys.readouterr().out.count(" \u00b1 ") == 2 * 11
     assert main(["compare", "--payload", "1500", "--angle", "30", "--controllers", "cascade"]) == 0
     assert "30 deg, 1500 kg: at 30.0 deg the boom needs" in capsys.readouterr().out
     image.unlink()
     assert main(["compare", "--damping", "--picture", str(image)]) == 0
     assert image.exists()
     assert "force feedback" in capsys.readouterr().out
+
+
+def test_compare_command_over_a_grid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image, table = tmp_path / "grid.png", tmp_path / "grid.csv"
+    words = ["--payload", "0", "1500", "--angle", "30", "60", "--size", "20"]
+    words += ["--controllers", "cascade", "pfc, preview"]
+    assert main(["compare", *words, "--picture", str(image), "--csv", str(table)]) == 0
+    captured = capsys.readouterr()
+    assert "3 cases; median / worst" in captured.out
+    assert "left out: at 30.0 deg the boom needs" in captured.err  # with 1500 kg
+    assert "smoother than conventional control (rms dv/dt): in " in captured.out
+    assert "angle: 30.0 deg" in captured.out
+    with table.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 3 * 2 * 2
+    margins = {
+        (row["angle"], row["payload"]): float(row["gain_margin"])
+        for row in rows
+        if (row["controller"], row["move"]) == ("pfc, preview", "lift")
+    }
+    assert margins["60.0", "1500.0"] < 1.0 < margins["60.0", "0.0"]
+    assert image.read_bytes().startswith(b"\x89PNG")
+
+
+def test_trade_off_of_conventional_control(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Paper 3.2: whoever wants to follow closer by these two bends the boom more."""
+    monkeypatch.setattr(trade_off, "GAINS", (1.0, 2.0))
+    monkeypatch.setattr(trade_off, "TIME_CONSTANTS", (0.1, 0.4))
+    found = trade_off.curve(joint1(), lambda _: None)
+    for slow, quick in (((2.0, 0.4), (2.0, 0.1)), ((1.0, 0.4), (1.0, 0.1))):
+        by_tuning = {(t.gain, t.time_constant): t for t in found}
+        assert by_tuning[quick].error < by_tuning[slow].error
+        assert by_tuning[quick].bending > by_tuning[slow].bending
+    image = tmp_path / "curve.png"
+    assert main(["compare", "--trade-off", "--picture", str(image)]) == 0
+    assert "| 2 | 0.4 |" in capsys.readouterr().out
+    assert image.read_bytes().startswith(b"\x89PNG")
+
+
+def test_gain_margin_is_where_the_poles_cross_the_unit_circle() -> None:
+    """Against the closed loop's eigenvalues, the machine's gain raised by the margin."""
+    law = Pfc(pfc_file.load(pfc_file.default_file("stroke"), "stroke"))
+    for payload in (0.0, 1500.0):
+        point = OperatingPoint(angle=math.radians(60.0), payload=payload)
+        linear = linear_machine(joint1(), point)
+        margin = gain_margin(linear, PfcLoop(law))
+        for factor, stable in ((0.95 * margin, True), (1.05 * margin, False)):
+            louder = replace(linear.model, B=factor * linear.model.B)
+            assert (spectral_radius(law, louder) < 1.0) == stable
 
 
 def test_figures_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -144,11 +213,13 @@ def test_figures_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     ("words", "said"),
     [
         (["--controllers", "magic"], "controller 'magic': there are cascade; pfc, preview"),
-        (["--repeat", "0"], "repeat = 0: at least 1"),
-        (["--trajectory", "hold"], "nothing moves in it"),
-        (["--trajectory", "loop"], "there are lift-lower"),
+        (["--angle", "45", "--repeat", "0"], "repeat = 0: at least 1"),
+        (["--angle", "45", "--trajectory", "hold"], "nothing moves in it"),
+        (["--angle", "45", "--trajectory", "loop"], "there are lift-lower"),
         (["--payload", "-1", "--controllers", "cascade"], "geometry.payload = -1"),
-        (["--angle", "30", "45", "--picture", "x.png"], "one picture shows one posture"),
+        (["--angle", "30", "45", "--repeat", "2"], "--repeat is for one case"),
+        (["--error", "magic"], "model error 'magic': there are none; oil -20%"),
+        (["--size", "-3"], "size = -3 mm: outside 0 ... 1000 mm"),
     ],
 )
 def test_bad_input_is_one_clear_line(

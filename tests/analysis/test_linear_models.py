@@ -119,7 +119,8 @@ def test_command_writes_models_that_python_control_reads_back(
         (["--velocity", "0"], "the machine has to move"),
         (["--command", "0.05"], "y2 = 0.05: in the valve's dead zone nothing moves"),
         (["--velocity", "500"], "no steady motion of 500 mm/s at 45 deg with 0 kg"),
-        (["--angle", "-60"], "the boom needs"),
+        (["--angle", "-60"], "boom angle -60.0 deg: outside the linkage's reach"),
+        (["--payload", "1500", "--angle", "5"], "the boom needs"),
         (["--outputs", "colour"], "output 'colour': there are angle, tip_angle, stroke"),
         (["--order", "1"], "order = 1: the model allows 2 ... 15"),
         (["--from", "none.yaml"], "none.yaml: No such file or directory"),
@@ -133,6 +134,16 @@ def test_bad_input_is_one_clear_line(
     shown = capsys.readouterr().err
     assert said in shown
     assert shown.count("\n") == 1
+
+
+def test_more_than_the_rated_payload_is_allowed_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--payload", "1600", "--angle", "75", "--order", "6", "--out", str(tmp_path)]
+    assert main(["linearize", *words]) == 0
+    assert capsys.readouterr().err == (
+        "warning: payload = 1600 kg: the machine is made for 1500 kg\n"
+    )
 
 
 def test_without_python_control_the_command_says_so(

@@ -2,13 +2,14 @@
 
 import json
 import math
+import re
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from emir_analysis import paper_numbers_machine
+from emir_analysis import paper_numbers_machine, paper_numbers_robot
 from emir_analysis.cli import main
 from emir_analysis.figure_boom import PERIOD, REST_PRESSURE, STEP_SIZE, SWING, deflections
 from emir_analysis.figure_flow import stationary
@@ -25,7 +26,7 @@ from emir_analysis.figure_steps import (
     slow_mode,
     step_responses,
 )
-from emir_analysis.paper_number import NO, NOT_MEASURED
+from emir_analysis.paper_number import NO, NOT_MEASURED, YES
 from emir_common.parameter_tree import with_values
 from emir_plant import linkage
 from emir_plant.core import Truth
@@ -161,9 +162,30 @@ def test_logic_block_interrupts_lowering_where_the_pressure_swings_low(
     assert steps.of(45.0, LOWERING, BLOCK_OPEN.name)[-1].least_flow > 0.99
 
 
-def test_table_follows_the_machine(steps: StepResponses, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pinocchio_the_robots_numbers_are_not_measured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(paper_numbers_robot, "find_spec", lambda _: None)
+    found = paper_numbers_robot.measure()
+    assert {n.number for n in found} == {2, 4, 5, 7, 11}
+    assert all(n.met == NOT_MEASURED and "emir_ros[robot]" in n.reason for n in found)
+
+
+@pytest.mark.skipif(not find_spec("pinocchio"), reason="Pinocchio is missing: extra robot")
+def test_stretched_and_locked_robot_is_joint_1s_own_model() -> None:
+    found = {n.what: n for n in paper_numbers_robot.measure()}
+    assert [n.what for n in found.values() if n.met != YES] == []
+    uniform = 5.4  # Hz, of the uniform boom; sagging 17.7 cm
+    assert float(found["slowest mode, whole robot"].ours.split()[0]) == pytest.approx(
+        uniform, rel=0.03
+    )
+    assert float(found["static deflection, whole robot"].ours.split()[0]) == pytest.approx(
+        17.7, rel=0.04
+    )
+
+
+def test_table_follows_the_machine(steps: StepResponses) -> None:
     """Another machine misses what the standard one meets: nothing of ours is written down."""
-    monkeypatch.setattr(paper_numbers_machine, "find_spec", lambda _: None)
     other = with_values(
         MACHINE,
         {
@@ -176,7 +198,6 @@ def test_table_follows_the_machine(steps: StepResponses, monkeypatch: pytest.Mon
         },
     )
     met = {n.what: n.met for n in paper_numbers_machine.measure(other, steps)}
-    assert met["main parts, bodies, DOF"] == NOT_MEASURED
     missed = [what for what, said in met.items() if said == NO and "step" not in what]
     assert missed == [
         "slowest mode of the mechanics",
@@ -205,6 +226,10 @@ def test_command_draws_and_writes_the_table(
     counts = next(row for row in table["numbers"] if row["number"] == 2)
     assert counts["met"] == ("yes" if find_spec("pinocchio") else "not measured")
     text = (tmp_path / "new" / "table.md").read_text()
+    documented = (Path(__file__).parents[2] / "docs" / "robot.md").read_text().splitlines()
+    rows = [line for line in documented if re.match(r"\| [1-5] \| [-0]", line)]
+    assert len(rows) == 5
+    assert all(row in text for row in rows)  # range, ratio and dead points of the linkages
     assert all(row["ours"] in text for row in table["numbers"])
 
 

@@ -89,7 +89,12 @@ def test_one_that_follows_its_twin_offers_what_the_twin_commands() -> None:
     ready = Ready("pfc", twin)
     rng = np.random.default_rng(3)
     state = driving = None
-    signals: dict[str, float] = {"stroke": 0.5, "reference_stroke": 0.5, "reference_velocity": 0.0}
+    signals: dict[str, float] = {
+        "stroke": 0.5,
+        "force": 2e5,
+        "reference_stroke": 0.5,
+        "reference_velocity": 0.0,
+    }
     signals |= {f"reference_stroke_{k}_ahead": 0.5 for k in range(1, 21)}
     fed_back: dict[str, float] = {}
     for _ in range(60):

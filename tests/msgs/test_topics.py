@@ -6,18 +6,35 @@ import pytest
 
 from emir_msgs_py import conversions
 from emir_msgs_py.meanings import field_table
+from emir_msgs_py.robot_topics import JOINTS, ROBOT_TOPICS
 from emir_msgs_py.topics import TOPICS, TRUTH, Topic, by_name
 from emir_plant.core import Truth
 from emir_plant.sensors import Measurement
 
-IDS = [topic.name for topic in TOPICS]
+EVERY = (*TOPICS, *ROBOT_TOPICS)
+IDS = [f"{topic.name}-{len(topic.fields)}" for topic in EVERY]
 
 
-def test_names_are_relative_and_signals_unique() -> None:
-    assert not any(topic.name.startswith("/") for topic in TOPICS)
-    assert max(Counter(IDS).values()) == 1
-    assert max(Counter(signal for topic in TOPICS for signal in topic.fields).values()) == 1
+@pytest.mark.parametrize("table", [TOPICS, ROBOT_TOPICS], ids=["joint1", "robot"])
+def test_names_are_relative_and_signals_unique(table: tuple[Topic, ...]) -> None:
+    assert not any(topic.name.startswith("/") for topic in table)
+    assert max(Counter(topic.name for topic in table).values()) == 1
+    assert max(Counter(signal for topic in table for signal in topic.fields).values()) == 1
+    assert by_name("truth", table) in table
     assert by_name("truth") is TRUTH
+
+
+def test_robot_has_joint_1s_topics_for_six() -> None:
+    """Same name, type, quality and publisher; six numbers for each one of joint 1."""
+    ours = {topic.name: topic for topic in ROBOT_TOPICS}
+    shared = [topic for topic in TOPICS if topic.name in ours and topic is not TRUTH]
+    assert {"joint_states", "cylinder_states", "valve_command"} <= {t.name for t in shared}
+    for topic in shared:
+        other = ours[topic.name]
+        assert (other.type, other.quality) == (topic.type, topic.quality)
+        assert other.publisher == topic.publisher
+        wanted = {f"{joint}_{signal}" for joint in JOINTS for signal in topic.fields}
+        assert set(other.fields) == wanted
 
 
 def test_truth_has_the_models_outputs_in_their_order() -> None:
@@ -30,14 +47,14 @@ def test_every_measurement_is_published() -> None:
     assert set(Measurement._fields) <= plants
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=IDS)
+@pytest.mark.parametrize("topic", EVERY, ids=IDS)
 def test_every_field_has_a_meaning_of_its_own(topic: Topic) -> None:
     meanings = [entry["meaning"] for entry in field_table(topic).values()]
     assert all(meanings)
     assert len(set(meanings)) == len(meanings)
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=IDS)
+@pytest.mark.parametrize("topic", EVERY, ids=IDS)
 def test_signals_survive_the_message_and_its_cdr(topic: Topic) -> None:
     serialization = pytest.importorskip("rclpy.serialization", reason="needs ROS 2")
     signals = {name: 0.1 + 1.7 * k for k, name in enumerate(topic.fields)}

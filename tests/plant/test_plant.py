@@ -11,6 +11,7 @@ from emir_common.quantity import ParameterError
 from emir_plant import core, linkage
 from emir_plant.core import Truth
 from emir_plant.linearize import linearize
+from emir_plant.parameters import cautions
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import joint1
 
@@ -150,6 +151,35 @@ def test_what_cannot_be_simulated_is_said_in_one_line() -> None:
         heavy.initial(0.0)
     with pytest.raises(ParameterError, match=r"valve.dead_zone = 2: outside 0 ... 0.5"):
         with_values(joint1(), {"valve.dead_zone": 2.0})
+
+
+@pytest.mark.parametrize("degrees", [-40.5, 140.5, 250.0, math.nan])
+def test_a_posture_out_of_reach_is_told_in_one_line(degrees: float) -> None:
+    with pytest.raises(SimulationError, match=r"^boom angle .* deg: outside the linkage's reach"):
+        PLANT.initial(math.radians(degrees))
+
+
+def test_reach_ends_at_a_dead_point_or_an_empty_chamber() -> None:
+    low, high = linkage.reach(PLANT.record[0])
+    for end in (low, high):
+        p, stroke = PLANT.record[0], linkage.stroke(end, PLANT.record[0])
+        left = (
+            linkage.lever_arm(end, p),
+            p["volume_lifting_0"] + p["area_lifting"] * stroke,
+            p["volume_lowering_0"] - p["area_lowering"] * stroke,
+        )
+        assert min(abs(value) for value in left) < 1e-9
+        assert min(left) > -1e-9
+
+
+def test_more_than_the_rated_payload_is_allowed_with_a_warning() -> None:
+    assert cautions(joint1()) == []
+    assert cautions(with_values(joint1(), {"geometry.payload": 1500.0})) == []
+    for path in ("geometry.payload", "effects.payload.mass"):
+        heavy = with_values(joint1(), {path: 2000.0, "supply.p0": 320e5})
+        (line,) = cautions(heavy)
+        assert line == "warning: payload = 2000 kg: the machine is made for 1500 kg"
+        Plant(heavy).initial(math.radians(70.0))
 
 
 def test_the_linear_model_has_no_state_of_an_effect_that_is_off() -> None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +13,12 @@ pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.plant import Plant, SimulationError
+from emir_plant.robot import actuators
 from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY, flows_of
 from emir_plant.robot.parameters import Pump, Robot
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.reach import PostureError
-from emir_plant.robot.sheet import robot
+from emir_plant.robot.sheet import load_robot, robot
 
 FORTY_FIVE = math.radians(45.0)
 STRETCHED = np.array([0.0, FORTY_FIVE, 0.0, 0.0, 0.0, 0.0])
@@ -167,15 +169,55 @@ def test_one_pump_feeds_all_and_droops() -> None:
     assert short[2] < short[5]  # the heavily loaded joint 2 goes short before joint 5
 
 
-def test_effects_act_on_joint_1_and_others_are_refused() -> None:
-    sticky = with_values(ROBOT, {"main.effects.coulomb_friction.force": 2e4})
+@pytest.mark.parametrize(("actuator", "place"), [(0, "base"), (1, "main"), (4, "joint4")])
+def test_effects_act_on_the_joint_that_they_are_stated_for(actuator: int, place: str) -> None:
+    """Leaking chambers at rest: their pressures fall, the others' do not."""
+    path = f"{place}.effects.external_leakage.lifting"
+    leaking = RobotPlant(with_values(ROBOT, {path: 1e-11}))
+    rate = leaking.derivative(leaking.initial(BENT, 20e5), SHUT)[1:SIZE].reshape(ACTUATORS, EACH)
+    falling = np.abs(rate[:, :2]).max(axis=1)
+    assert falling[actuator] > 1e3
+    assert np.delete(falling, actuator).max() < 1e-3 * falling[actuator]
+
+
+@pytest.mark.parametrize("place", ["main", "joint3"])
+def test_friction_of_a_joint_shows_in_its_pressure(place: str) -> None:
+    k = 1 if place == "main" else 3
+    area = PLANT.tables.drives[k]["area_lifting"]
+    force = 0.03 * area * 1e7
+    sticky = with_values(ROBOT, {f"{place}.effects.coulomb_friction.force": force})
     x, y = PLANT.initial(BENT, 20e5), RobotPlant(sticky).initial(BENT, 20e5)
-    x, y = PLANT.advance(x, MOVING, 0.5), RobotPlant(sticky).advance(y, MOVING, 0.5)
-    more = y[1 + EACH] - x[1 + EACH]  # p_H of joint 1; the friction is 3.2 bar
-    assert 0.0 < more < 2.0 * 2e4 / ROBOT.main.cylinder.area_lifting
-    late = with_values(ROBOT, {"main.effects.command_delay.delay": 0.01})
-    with pytest.raises(ParameterError, match=r"effects.command_delay: not in the model"):
-        RobotPlant(late).initial(BENT)
+    lifting = np.full(6, 0.5)
+    x, y = PLANT.advance(x, lifting, 0.5), RobotPlant(sticky).advance(y, lifting, 0.5)
+    more = y[1 + k * EACH] - x[1 + k * EACH]
+    assert 0.0 < more < 2.0 * force / area
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("main.effects.command_delay.delay", r"^effects.command_delay: not in the model"),
+        ("joint2.effects.payload.mass", r"^joint2.effects.payload: not in the model"),
+    ],
+)
+def test_effects_without_a_place_are_refused(path: str, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        RobotPlant(with_values(ROBOT, {path: 0.01})).initial(BENT)
+
+
+def test_effects_of_a_joint_are_switched_on_in_its_file(tmp_path: Path) -> None:
+    stated = (Path(actuators.__file__).parents[1] / "data" / "robot.yaml").read_text()
+    file = tmp_path / "robot.yaml"
+    on = "joint2:\n  effects: {coulomb_friction: {force: 3.0e+3}}\n"
+    file.write_text(stated.replace("joint2:\n", on))
+    expected = with_values(ROBOT, {"joint2.effects.coulomb_friction.force": 3e3})
+    assert load_robot(file, ROBOT.main) == expected
+    file.write_text(stated.replace("joint2:\n", on.replace("coulomb", "colomb")))
+    with pytest.raises(ParameterError, match=r"joint2.effects.colomb_friction: there is no such"):
+        load_robot(file, ROBOT.main)
+    file.write_text(stated.replace("joint2:\n", on.replace("3.0e+3", "-1.0")))
+    with pytest.raises(ParameterError, match=r"joint2.effects.coulomb_friction.force = -1: out"):
+        load_robot(file, ROBOT.main)
 
 
 def test_end_stop_holds_the_piston() -> None:

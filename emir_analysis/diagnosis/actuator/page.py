@@ -1,0 +1,94 @@
+"""The report of an actuator's diagnosis as a page, and its pictures."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
+from emir_analysis.diagnosis.actuator.result import ActuatorDiagnosis
+from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
+from emir_analysis.signals import Array
+
+COLOURS = {"nominal": "#b9c2cb", "refitted": "#e8963a", "black_box": "#7a9e3b",
+           "with_effect": "#0b6bb5"}  # fmt: skip
+LABELS = {"nominal": "data sheet", "refitted": "re-fitted", "with_effect": "with effects",
+          "black_box": "best linear model"}  # fmt: skip
+MEASURED = "#1d2733"
+
+
+def write_page(
+    path: Path, result: ActuatorDiagnosis, judged: ActuatorRecord, runs: dict[str, Array]
+) -> None:
+    """Write the report as HTML. Raises InputError when the file cannot be written."""
+    s = result.signals[PRESSURE]
+    errors = {name: getattr(s, name) for name in LABELS}
+    balance_rows = [
+        (name, b.noise, b.before, b.refitted, b.after) for name, b in result.balances.items()
+    ]
+    rows = [
+        (e.name, e.balance, name, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
+        for e in result.effects
+        for name, p in e.parameters.items()
+    ]
+    blocks: list[Block] = [
+        Text(f"{result.verdict}: {result.statement}.", lead=True),
+        Text(result.not_told.capitalize() + "."),
+        Table(
+            ("effect", "balance", "parameter", "value", "low", "high", "unit"),
+            rows,
+            "low, high: two standard deviations from the curvature of the fit. Flows are in units"
+            " of the pressure rate that they make, velocities in units of flow.",
+        ),
+        Heading(f"Free run on {Path(result.judged_on).name}"),
+        Table(
+            ("", "RMS error", "share of the spread"),
+            [(LABELS[n], e, e / result.spread) for n, e in errors.items()],
+            f"Unit: the file's ({s.unit}); noise of the pressure {s.noise:.2g}.",
+        ),
+        Picture(
+            _picture(judged, runs, result.time_unit),
+            "Simulated under the recorded valve opening alone; below, simulated minus measured.",
+        ),
+        Heading("What the balance of the oil lacks"),
+        Table(
+            ("balance", "noise", "data sheet", "re-fitted", "with effects"),
+            balance_rows,
+            "RMS over half a slow period, the measured pressure in every term.",
+        ),
+        Heading("What was tried"),
+        Table(
+            ("effects", "better by", "error on blocks left out"),
+            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in result.candidates],
+            "Bayesian information criterion over that of parameters only; another 6 are strong.",
+        ),
+        Heading("Parameters"),
+        Table(
+            ("parameter", "fitted", "low", "high", "unit"),
+            [
+                (path, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
+                for path, p in result.parameters.items()
+            ],
+        ),
+    ]
+    write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
+
+
+def _picture(judged: ActuatorRecord, runs: dict[str, Array], time_unit: str) -> Figure:
+    figure = new_figure(7.0)
+    above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 3, 2))
+    above.plot(judged.time, judged.opening, color=MEASURED, lw=0.9)
+    above.set_ylabel(OPENING.replace("_", " "))
+    limit = 2.0 * abs(judged.pressure).max()
+    for name, colour in COLOURS.items():
+        shown = runs[name].clip(-limit, limit)
+        middle.plot(judged.time, shown, color=colour, lw=1.0, label=LABELS[name])
+        below.plot(judged.time, shown - judged.pressure, color=colour, lw=0.8)
+    middle.plot(judged.time, judged.pressure, color=MEASURED, lw=1.0, ls="--", label="measured")
+    middle.set_ylabel(PRESSURE.replace("_", " "))
+    middle.legend(ncols=5, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    below.set_ylabel("error")
+    below.set_xlabel(f"time, {time_unit}")
+    for ax in (above, middle, below):
+        ax.grid(color="#dfe4e9", lw=0.6)
+        ax.spines[["top", "right"]].set_visible(False)
+    return figure

@@ -1,0 +1,102 @@
+"""A recording of an actuator as its diagnosis uses it: opening and pressure on one time grid."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from emir_analysis.errors import InputError
+from emir_analysis.signals import Array, Signal, SignalMap, load
+
+OPENING, PRESSURE = "valve_opening", "oil_pressure"
+FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
+LARGEST_GAP = 1.5  # sampling periods
+SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
+
+
+@dataclass(frozen=True)
+class ActuatorRecord:
+    """One recording. opening, pressure: (n,). period: between samples, in the stamps' unit.
+
+    begin: stamp of the first sample. unit: of the pressure.
+    """
+
+    name: str
+    begin: float
+    period: float
+    opening: Array
+    pressure: Array
+    unit: str
+
+    @property
+    def time(self) -> Array:
+        """Return the stamps of the samples, (n,)."""
+        return self.begin + self.period * np.arange(self.opening.size, dtype=np.float64)
+
+    def follows(self, earlier: "ActuatorRecord") -> bool:
+        """Return whether this recording goes on where another has ended."""
+        gap = self.begin - (earlier.begin + earlier.period * earlier.opening.size)
+        same = abs(self.period - earlier.period) < 1e-6 * self.period
+        return same and abs(gap) < 0.5 * self.period
+
+    def behind(self, earlier: "ActuatorRecord") -> "ActuatorRecord":
+        """Return the earlier recording and this one as one."""
+        return replace(
+            earlier,
+            opening=np.concatenate([earlier.opening, self.opening]),
+            pressure=np.concatenate([earlier.pressure, self.pressure]),
+        )
+
+
+def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
+    """Load a recording of valve opening and oil pressure.
+
+    Raises InputError for a missing signal, another unit, gaps, a recording that is too short or
+    in which the valve or the pressure never moves; the message says what to record instead.
+    """
+    for name in (OPENING, PRESSURE):
+        if name not in signal_map:
+            raise InputError(f"the signal map has no {name}, which an actuator's diagnosis needs")
+    if signal_map[OPENING][2] != "1":
+        raise InputError(f"the signal map has {OPENING} in {signal_map[OPENING][2]}, expected 1")
+    recording = load(path, {name: signal_map[name] for name in (OPENING, PRESSURE)})
+    opening, pressure = recording[OPENING], recording[PRESSURE]
+    period = float(np.median(np.diff(pressure.time)))
+    for signal in (opening, pressure):
+        _check(path, signal, period)
+    begin = max(opening.time[0], pressure.time[0])
+    count = int((min(opening.time[-1], pressure.time[-1]) - begin) / period + 1e-6) + 1
+    if count < FEWEST:
+        raise InputError(
+            f"{path}: {max(count, 0)} samples that both signals share; record at least {FEWEST}"
+        )
+    time = begin + period * np.arange(count)
+    return ActuatorRecord(
+        str(path),
+        recording.start_ns * 1e-9 + begin,
+        period,
+        np.interp(time, opening.time, opening.value),
+        np.interp(time, pressure.time, pressure.value),
+        pressure.unit,
+    )
+
+
+def noise_of(pressure: Array) -> float:
+    """Return the white noise in a smooth signal, from the median of its third differences."""
+    third = np.diff(pressure, 3)
+    return float(np.median(np.abs(third)) / (0.6745 * np.sqrt(20.0)))
+
+
+def _check(path: Path, signal: Signal, period: float) -> None:
+    gaps = np.diff(signal.time)
+    widest = int(np.argmax(gaps))
+    if gaps[widest] > LARGEST_GAP * period:
+        raise InputError(
+            f"{path}: {signal.name} has a gap of {gaps[widest]:.3g} at {signal.time[widest]:.3f},"
+            f" sampled every {period:.3g}; record without gaps"
+        )
+    if np.ptp(signal.value) <= SMALLEST_MOTION * np.abs(signal.value).max():
+        raise InputError(
+            f"{path}: {signal.name} is constant ({signal.value[0]:g});"
+            " record the valve opened both ways, several times"
+        )

@@ -1,0 +1,268 @@
+"""The result of an actuator's diagnosis, in the form and with the keys of the boom's."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run
+from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
+from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
+from emir_analysis.diagnosis.actuator.search import AT_NOISE, Search
+from emir_analysis.errors import InputError
+from emir_analysis.signals import Array
+from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
+from emir_plant.actuator.model import driven
+
+BALANCE = "oil"  # the only one that opening and pressure allow
+EXPLAINED = 0.7  # of the error without effects, on blocks left out: half of its square
+INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
+NOT_TOLD = (
+    "without the piston's position and velocity, forces cannot be told from flows by"
+    " measurement: effects are told apart by the course of the pressure alone"
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A fitted parameter; low, high: two standard deviations from the curvature of the fit."""
+
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class EffectResult:
+    """An effect that the machine has, with its parameters by name."""
+
+    name: str
+    balance: str
+    parameters: dict[str, Parameter]
+
+
+@dataclass(frozen=True)
+class CandidateResult:
+    """What was tried. score: how much better (BIC) than parameters only; unseen: see `Tried`."""
+
+    name: str
+    score: float
+    unseen: float | None
+
+
+@dataclass(frozen=True)
+class BalanceResult:
+    """RMS of what is missing over half a slow period; noise: the transducer's share."""
+
+    unit: str
+    noise: float
+    before: float
+    refitted: float
+    after: float
+
+
+@dataclass(frozen=True)
+class SignalResult:
+    """RMS error of the free run over the judge recording."""
+
+    unit: str
+    noise: float
+    nominal: float
+    refitted: float
+    with_effect: float
+    black_box: float
+
+
+@dataclass(frozen=True)
+class ActuatorDiagnosis:
+    """What the model of an actuator lacks. spread: standard deviation of the judged pressure."""
+
+    verdict: str
+    statement: str
+    effects: tuple[EffectResult, ...]
+    candidates: tuple[CandidateResult, ...]
+    balances: dict[str, BalanceResult]
+    signals: dict[str, SignalResult]
+    parameters: dict[str, Parameter]
+    spread: float
+    not_told: str
+    time_unit: str
+    recording: str
+    judged_on: str
+    judged_from_its_own_start: bool
+
+
+def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:
+    """Return the noise of the pressure: the data sheet's, or that which the recording shows."""
+    return sheet.machine.sensor.pressure_noise or noise_of(record.pressure)
+
+
+def stages(sheet: ActuatorSheet, found: Search) -> dict[str, Actuator]:
+    """Return the machine as stated, re-fitted, and with the effects that were chosen."""
+    return {
+        "nominal": sheet.machine,
+        "refitted": found.plain.fitted.machine,
+        "with_effect": found.chosen.fitted.machine,
+    }
+
+
+def judged_runs(
+    machines: dict[str, Actuator], record: ActuatorRecord, judge: ActuatorRecord | None
+) -> dict[str, Array]:
+    """Return each machine's pressure over the judge recording, (n,), and the linear model's.
+
+    A judge recording that goes on where the other ended is simulated from that one's start, by
+    the valve opening alone. judge: None for the recording itself.
+    """
+    judged, skipped = record, 0
+    if judge is not None and judge.follows(record):
+        judged, skipped = judge.behind(record), record.opening.size
+    elif judge is not None:
+        judged = judge
+    runs = {name: free_run(machine, judged)[skipped:] for name, machine in machines.items()}
+    return runs | {"black_box": linear_run(linear_model(record), judged.opening)[skipped:]}
+
+
+def diagnosis(
+    sheet: ActuatorSheet,
+    found: Search,
+    record: ActuatorRecord,
+    judge: ActuatorRecord | None,
+    runs: dict[str, Array],
+) -> ActuatorDiagnosis:
+    """Put the findings into numbers; runs: as `judged_runs` returns them."""
+    noise = noise_floor(sheet, record)
+    judged = record if judge is None else judge
+    errors = {name: _rms(run - judged.pressure) for name, run in runs.items()}
+    chosen = found.chosen.fitted
+    fitted = _parameters(chosen)
+    verdict = _verdict(found, noise)
+    return ActuatorDiagnosis(
+        verdict=verdict,
+        statement=_statement(verdict, found, noise),
+        effects=tuple(_effect(name, fitted) for name in chosen.effects)
+        if verdict in ("found", "ambiguous")
+        else (),
+        candidates=tuple(
+            CandidateResult(
+                t.fitted.name,
+                found.plain.score - t.score,
+                t.unseen if math.isfinite(t.unseen) else None,
+            )
+            for t in found.tried[1:]
+        ),
+        balances={BALANCE: _balance(sheet, found, record, noise)},
+        signals={PRESSURE: SignalResult(record.unit, noise, **errors)},
+        parameters={path: p for path, p in fitted.items() if path in sheet.ranges},
+        spread=float(np.std(judged.pressure)),
+        not_told=NOT_TOLD,
+        time_unit=sheet.time_unit,
+        recording=record.name,
+        judged_on=judged.name,
+        judged_from_its_own_start=judge is None or not judge.follows(record),
+    )
+
+
+def write_json(path: Path, result: ActuatorDiagnosis) -> None:
+    """Write the result as JSON. Raises InputError when the file cannot be written."""
+    try:
+        path.write_text(json.dumps(asdict(result), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+
+
+def summary(result: ActuatorDiagnosis) -> str:
+    """Return the result as lines for a terminal."""
+    s = result.signals[PRESSURE]
+    start = "its own start" if result.judged_from_its_own_start else f"that of {result.recording}"
+    lines = [f"{result.verdict}: {result.statement}", f"({result.not_told})", ""]
+    for effect in result.effects:
+        for name, p in effect.parameters.items():
+            about = f"{p.value:10.4g}  ({p.low:.3g} ... {p.high:.3g}) {_unit(p.unit, result)}"
+            lines.append(f"{effect.name + '.' + name:36}{about}")
+    figures = (
+        f"  data sheet {s.nominal:.3f}, re-fitted {s.refitted:.3f}, with the effects"
+        f" {s.with_effect:.3f}, best linear model {s.black_box:.3f}"
+    )
+    lines += [
+        "",
+        f"free run of {PRESSURE} on {result.judged_on}, from {start}, by the valve opening alone",
+        f"RMS error in units of the file (its spread {result.spread:.3g}, noise {s.noise:.2g}):",
+        figures,
+    ]
+    return "\n".join(lines)
+
+
+def _unit(unit: str, result: ActuatorDiagnosis) -> str:
+    shown = unit.replace("time", result.time_unit)
+    return "" if shown == "1" else shown
+
+
+def _verdict(found: Search, noise: float) -> str:
+    plain, chosen = found.plain, found.chosen
+    if plain.unseen <= AT_NOISE * noise:
+        return "nothing_missing"
+    if not chosen.fitted.effects or chosen.unseen > EXPLAINED * plain.unseen:
+        return "unexplained"
+    return "ambiguous" if found.rivals else "found"
+
+
+def _statement(verdict: str, found: Search, noise: float) -> str:
+    chosen, plain = found.chosen, found.plain
+    if verdict == "nothing_missing":
+        return "parameters inside their ranges bring the free run to the noise"
+    left = (
+        f"{chosen.unseen:.3g} is left of {plain.unseen:.3g} on blocks left out of the fit,"
+        f" {chosen.unseen / noise:.0f} times the noise"
+    )
+    if verdict == "unexplained":
+        closest = f"{chosen.fitted.name} comes closest; " if chosen.fitted.effects else ""
+        return f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says why"
+    names = chosen.fitted.name
+    if verdict == "ambiguous":
+        rivals = " or ".join(_instead(rival.fitted, chosen.fitted) for rival in found.rivals)
+        names += f" ({rivals} would do as well: this recording cannot tell)"
+    return f"{names}; {left}"
+
+
+def _instead(rival: Fitted, chosen: Fitted) -> str:
+    added = [name for name in rival.effects if name not in chosen.effects]
+    missing = [name for name in chosen.effects if name not in rival.effects]
+    return f"{' and '.join(added)} in place of {' and '.join(missing)}"
+
+
+def _parameters(fitted: Fitted) -> dict[str, Parameter]:
+    found = {}
+    for unknown, x, deviation in zip(fitted.unknowns, fitted.x, fitted.deviation, strict=True):
+        ends = [min(max(x + s * INTERVAL * deviation, unknown.low), unknown.high) for s in (-1, 1)]
+        low, high = sorted(unknown.value(float(end)) for end in ends)
+        found[unknown.path] = Parameter(unknown.value(float(x)), unknown.unit, low, high)
+    return found
+
+
+def _effect(name: str, fitted: dict[str, Parameter]) -> EffectResult:
+    start = f"effects.{name}."
+    own = {path.removeprefix(start): p for path, p in fitted.items() if path.startswith(start)}
+    return EffectResult(name, REGISTRY[name].balance, own)
+
+
+def _balance(
+    sheet: ActuatorSheet, found: Search, record: ActuatorRecord, noise: float
+) -> BalanceResult:
+    slow = math.pi / found.plain.fitted.machine.load.frequency / record.period
+    window = max(1, round(slow))
+
+    def missing(machine: Actuator) -> float:
+        modelled = driven(machine, record.opening, record.pressure, record.period)
+        rest = record.pressure - modelled
+        return _rms(rest[window:] - rest[:-window])
+
+    figures = (missing(machine) for machine in stages(sheet, found).values())
+    return BalanceResult(record.unit, math.sqrt(2.0) * noise, *figures)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,139 @@
+"""What each control node computes for the whole robot, by the signals of its topics.
+
+The nodes of the graph, the plain loop and the replay of a recording all hold these objects.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_analysis.node_controls import Signals, Topics
+from emir_analysis.robot_setup import RobotForceLoopParameters
+from emir_control.cascade import Cascade, CascadeInputs
+from emir_control.force_loop import ForceLoop, ForceLoopInputs
+from emir_control.robot_trajectory import RobotTrajectory, RobotTrajectoryInputs
+from emir_control.trajectory import Reference
+from emir_msgs_py.robot_topics import (
+    JOINTS,
+    PRESSURES,
+    ROBOT_CASCADE_TERMS,
+    ROBOT_CYLINDER_REFERENCE,
+    ROBOT_CYLINDER_STATES,
+    ROBOT_FORCE_LOOP_TERMS,
+    ROBOT_JOINT_STATES,
+    ROBOT_VALVE_COMMAND,
+    ROBOT_VELOCITY_COMMAND,
+    TCP_REFERENCE,
+    of_joints,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RobotTrajectoryControl:
+    """trajectory_node: the desired motion of all pistons, and of the TCP."""
+
+    inputs: ClassVar[Topics] = (ROBOT_JOINT_STATES,)
+    outputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, TCP_REFERENCE)
+    trajectory: RobotTrajectory
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the reference of this period."""
+        inputs = RobotTrajectoryInputs(_six(signals, "angle"))
+        state, now = self.trajectory.step(state or self.trajectory.initial(inputs), inputs, dt)
+        outputs = _signals("reference_stroke", now.strokes)
+        outputs |= _signals("reference_velocity", now.velocities)
+        yaw = math.atan2(now.place[1], now.place[0])
+        outputs |= pose_signals("tcp_reference", now.place[:3], _quaternion(yaw, now.place[3]))
+        return state, outputs
+
+
+@dataclass(frozen=True)
+class RobotCascadeControl:
+    """cascade_node: law (11) for every joint, with the same gain and lag."""
+
+    inputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (ROBOT_CASCADE_TERMS, ROBOT_VELOCITY_COMMAND)
+    cascade: Cascade
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the commands and their terms."""
+        after: dict[str, Any] = {}
+        outputs: Signals = {}
+        for joint in JOINTS:
+            wanted = Reference(
+                signals[f"{joint}_reference_stroke"], signals[f"{joint}_reference_velocity"]
+            )
+            inputs = CascadeInputs(wanted, signals[f"{joint}_stroke"])
+            own = state[joint] if state else self.cascade.initial(inputs)
+            after[joint], shown = self.cascade.step(own, inputs, dt)
+            outputs |= {f"{joint}_{name}": value for name, value in shown._asdict().items()}
+        return after, outputs
+
+
+@dataclass(frozen=True)
+class RobotForceLoopControl:
+    """force_loop_node: force feedback and prefilter of every joint."""
+
+    inputs: ClassVar[Topics] = (ROBOT_VELOCITY_COMMAND, ROBOT_CYLINDER_STATES, PRESSURES)
+    outputs: ClassVar[Topics] = (ROBOT_FORCE_LOOP_TERMS, ROBOT_VALVE_COMMAND)
+    parameters: RobotForceLoopParameters
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the commands and their terms."""
+        after: dict[str, Any] = {}
+        outputs: Signals = {}
+        for joint in JOINTS:
+            loop = ForceLoop(getattr(self.parameters, joint))
+            inputs = ForceLoopInputs(
+                signals[f"{joint}_velocity_command"],
+                0.0,
+                0.0,
+                signals[f"{joint}_pressure_lifting"],
+                signals[f"{joint}_pressure_lowering"],
+                signals[f"{joint}_stroke"],
+            )
+            own = state[joint] if state else loop.initial(inputs)
+            after[joint], shown = loop.step(own, inputs, dt)
+            outputs |= {
+                f"{joint}_valve_command": shown.valve_command,
+                f"{joint}_measured_force": shown.force,
+                f"{joint}_force_feedback": shown.feedback,
+                f"{joint}_wanted_velocity": shown.velocity,
+                f"{joint}_saturated": float(shown.saturated),
+            }
+        return after, outputs
+
+
+def shut_signals() -> Signals:
+    """Return the force loop's signals that shut all valves."""
+    return {
+        name: 0.0 for topic in RobotForceLoopControl.outputs for name in topic.fields
+    } | dict.fromkeys(of_joints("measured_force"), math.nan)
+
+
+def pose_signals(prefix: str, position: Array, quaternion: Array) -> Signals:
+    """Return the signals of a pose; quaternion: (4,), x, y, z, w."""
+    places = {f"{prefix}_{axis}": float(v) for axis, v in zip("xyz", position, strict=True)}
+    turns = {f"{prefix}_q{axis}": float(v) for axis, v in zip("xyzw", quaternion, strict=True)}
+    return places | turns
+
+
+def _quaternion(yaw: float, pitch: float) -> Array:
+    """Return x, y, z, w of a turn about z by the yaw and then about -y by the pitch, rad."""
+    turned, lifted = (math.cos(0.5 * yaw), math.sin(0.5 * yaw)), 0.5 * pitch
+    up, along = math.sin(lifted), math.cos(lifted)
+    return np.array([turned[1] * up, -turned[0] * up, turned[1] * along, turned[0] * along])
+
+
+def _six(signals: Mapping[str, float], quantity: str) -> Array:
+    return np.array([signals[name] for name in of_joints(quantity)])
+
+
+def _signals(quantity: str, values: Array) -> Signals:
+    return dict(zip(of_joints(quantity), map(float, values), strict=True))

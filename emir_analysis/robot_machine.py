@@ -1,0 +1,96 @@
+"""The simulated robot by the signals of its topics, and the closed loop about it without ROS."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from emir_analysis.node_controls import NodeControl, Signals
+from emir_analysis.robot_controls import pose_signals
+from emir_msgs_py.robot_topics import (
+    PRESSURES,
+    ROBOT_CYLINDER_STATES,
+    ROBOT_JOINT_STATES,
+    ROBOT_TRUTH,
+    ROBOT_VALVE_COMMAND,
+    TCP_DEFLECTION,
+    TCP_POSE,
+    TRUE_QUANTITIES,
+    of_joints,
+)
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS
+from emir_plant.robot.plant import RobotPlant, RobotTruth
+from emir_plant.robot.sensors import RobotMeasurement, measure
+
+Array = NDArray[np.float64]
+
+OUTPUTS = (
+    ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES, PRESSURES, TCP_POSE, TCP_DEFLECTION, ROBOT_TRUTH,
+)  # fmt: skip
+TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
+PERIOD = CONTROL_PERIOD_NS * 1e-9
+PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
+
+
+def period(control: NodeControl) -> float:
+    """Return a control's period, s: that of what it gives."""
+    return PLANT_PERIOD if control.outputs[0].every == "plant" else PERIOD
+
+
+def commands(signals: Signals) -> Array:
+    """Return the six valve commands, base first."""
+    return np.array([signals[name] for name in ROBOT_VALVE_COMMAND.fields])
+
+
+def sensor_signals(plant: RobotPlant, truth: RobotTruth, tick: int) -> Signals:
+    """Return every signal that the plant publishes at a plant period."""
+    reading = measure(plant, truth, tick)
+    signals: Signals = {}
+    for quantity in RobotMeasurement._fields:
+        values = getattr(reading, quantity).tolist()
+        signals |= zip(of_joints(quantity), values, strict=True)
+    for quantity in TRUE_QUANTITIES:
+        values = getattr(truth, quantity).tolist()
+        signals |= zip(of_joints(f"true_{quantity}"), values, strict=True)
+    signals["supply_pressure"] = truth.supply_pressure
+    bent = (*truth.deflection.tolist(), *truth.deflection_rotation.tolist())
+    signals |= zip(TCP_DEFLECTION.fields, bent, strict=True)
+    turn = pin.Quaternion(truth.axes).coeffs()
+    return signals | pose_signals("tcp", truth.position, math.copysign(1.0, turn[3]) * turn)
+
+
+@dataclass(frozen=True)
+class RobotLoop:
+    """The robot and the controls about it, each given the signals of those before it."""
+
+    plant: RobotPlant
+    controls: Sequence[NodeControl]
+
+    def run(self, joints: Array, pressure_lowering: float, duration: float) -> dict[str, Array]:
+        """Run from rest at the joints' angles, (6,) rad, for a duration, s.
+
+        Returns every signal of the topic table by name, as `ClosedLoop.run`.
+        """
+        state = self.plant.initial(joints, pressure_lowering)
+        truth = self.plant.outputs(state)
+        states: list[Any] = [None] * len(self.controls)
+        rows: dict[str, list[float]] = {}
+        signals: Signals = {}  # those of the controllers last till the next
+        last = round(duration / PERIOD) * TICKS
+        for tick in range(last + 1):
+            new = sensor_signals(self.plant, truth, tick)
+            for k, control in enumerate(self.controls):
+                dt = period(control)
+                if dt == PLANT_PERIOD or tick % TICKS == 0:
+                    states[k], outputs = control.step(states[k], signals | new, dt)
+                    new |= outputs
+            signals |= new
+            for name, value in new.items():
+                rows.setdefault(name, []).append(value)
+            if tick < last:
+                state, truth = self.plant.step(state, commands(signals), PLANT_PERIOD)
+        return {name: np.array(values) for name, values in rows.items()}

@@ -1,0 +1,23 @@
+"""A hydraulic actuator of which little is known: a valve, oil, a moving mass.
+
+A machine in normalised units: valve opening in, oil pressure out, time in whatever the recording
+counts (seconds or samples). The oil's capacity is the unit of volume per pressure, so that a
+flow is the rate at which it would raise the pressure, and a velocity the flow that it takes up.
+See docs/actuator.md.
+"""
+
+from emir_plant.actuator.effects import REGISTRY
+from emir_plant.actuator.model import rates, simulate
+from emir_plant.actuator.parameters import Actuator
+from emir_plant.actuator.sheet import ActuatorSheet, is_actuator, load_actuator, write_actuator
+
+__all__ = [
+    "REGISTRY",
+    "Actuator",
+    "ActuatorSheet",
+    "is_actuator",
+    "load_actuator",
+    "rates",
+    "simulate",
+    "write_actuator",
+]

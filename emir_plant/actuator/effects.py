@@ -1,0 +1,231 @@
+"""What an actuator may have beyond valve, oil and mass, in normalised units.
+
+`Effects` is the registry: each field is off by default, a search tries them all. Names are those
+of the boom's effects where the physics is the same. A flow counts as lifting where it raises the
+pressure. The terms stand in `model.py`.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, get_type_hints
+
+from emir_common.quantity import quantity
+from emir_plant.effects.base import Balance, Effect
+
+OF_ORDER_ONE = "signals are scaled to the order of one, and so is what makes them"
+
+
+@dataclass(frozen=True)
+class CommandDelay(Effect):
+    """The spool follows the opening of a while ago."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("delay",)
+    source: ClassVar[str] = "pilot stage and electronics, a few samples"
+    trial: ClassVar[dict[str, float]] = {"delay": 1.0}
+
+    delay: float = quantity("time", 0.0, 20.0, "pure delay", default=0.0)
+
+
+@dataclass(frozen=True)
+class ValveNullOffset(Effect):
+    """The valve is shut at another opening than zero."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("offset",)
+    source: ClassVar[str] = "null adjustment, some percent of the stroke"
+    trial: ClassVar[dict[str, float]] = {"offset": 0.02}
+
+    offset: float = quantity("1", -0.3, 0.3, "added to the opening", default=0.0)
+
+
+@dataclass(frozen=True)
+class ValveDeadZoneError(Effect):
+    """Overlap: no flow until the spool has passed it, in each direction."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("lifting", "lowering")
+    source: ClassVar[str] = "overlap of closed-centre spools, 5-20 % of the stroke"
+    trial: ClassVar[dict[str, float]] = {"lifting": 0.05, "lowering": 0.05}
+
+    lifting: float = quantity("1", 0.0, 0.8, "opening below which nothing lifts", default=0.0)
+    lowering: float = quantity("1", 0.0, 0.8, "opening below which nothing lowers", default=0.0)
+
+
+@dataclass(frozen=True)
+class ValveGainAsymmetry(Effect):
+    """Lowering opens the valve by another factor than lifting."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("lowering",)
+    source: ClassVar[str] = "areas of a differential cylinder, up to 1:2"
+    trial: ClassVar[dict[str, float]] = {"lowering": 0.3}
+
+    lowering: float = quantity("1", -0.8, 4.0, "relative excess while lowering", default=0.0)
+
+
+@dataclass(frozen=True)
+class ValveHysteresis(Effect):
+    """Play between command and spool."""
+
+    balance: ClassVar[Balance] = "valve"
+    sizes: ClassVar[tuple[str, ...]] = ("play",)
+    source: ClassVar[str] = "friction of the spool, some percent of the stroke"
+    trial: ClassVar[dict[str, float]] = {"play": 0.02}
+
+    play: float = quantity("1", 0.0, 0.5, "half the width of the loop", default=0.0)
+
+
+@dataclass(frozen=True)
+class FlowLimit(Effect):
+    """The pump gives no more than so much, whatever the valve asks; 0: no limit."""
+
+    balance: ClassVar[Balance] = "supply"
+    sizes: ClassVar[tuple[str, ...]] = ("lifting", "lowering")
+    source: ClassVar[str] = "displacement of the pump, or a flow regulator"
+    trial: ClassVar[dict[str, float]] = {"lifting": 1.5, "lowering": 1.5}
+
+    lifting: float = quantity("pressure/time", 0.0, 100.0, "greatest flow lifting", default=0.0)
+    lowering: float = quantity("pressure/time", 0.0, 100.0, "greatest flow lowering", default=0.0)
+
+
+@dataclass(frozen=True)
+class SupplyPressureDroop(Effect):
+    """Turbulent flow through the valve's orifice from a supply of finite pressure."""
+
+    balance: ClassVar[Balance] = "supply"
+    sizes: ClassVar[tuple[str, ...]] = ("lifting", "lowering")
+    source: ClassVar[str] = "Q = c o sqrt(dp): the load takes part of the supply pressure"
+    trial: ClassVar[dict[str, float]] = {"lifting": 0.1, "lowering": 0.1}
+
+    lifting: float = quantity(
+        "1/pressure", 0.0, 1.0, "one over the pressure at which lifting stalls", default=0.0
+    )
+    lowering: float = quantity(
+        "1/pressure", 0.0, 1.0, "one over the pressure at which lowering stalls", default=0.0
+    )
+
+
+@dataclass(frozen=True)
+class ReliefValve(Effect):
+    """Relief and anti-cavitation valves hold the pressure inside a range; 0: no valve."""
+
+    balance: ClassVar[Balance] = "chambers"
+    sizes: ClassVar[tuple[str, ...]] = ("high", "low")
+    source: ClassVar[str] = OF_ORDER_ONE
+    trial: ClassVar[dict[str, float]] = {"high": 3.0, "low": 3.0}
+
+    high: float = quantity("pressure", 0.0, 100.0, "opens above", default=0.0)
+    low: float = quantity("pressure", 0.0, 100.0, "feeds below minus this", default=0.0)
+
+
+@dataclass(frozen=True)
+class InternalLeakage(Effect):
+    """Oil leaks past the piston, in proportion to the pressure."""
+
+    balance: ClassVar[Balance] = "chambers"
+    sizes: ClassVar[tuple[str, ...]] = ("conductance",)
+    source: ClassVar[str] = OF_ORDER_ONE
+    trial: ClassVar[dict[str, float]] = {"conductance": 0.02}
+
+    conductance: float = quantity("1/time", 0.0, 2.0, "leakage flow per pressure", default=0.0)
+
+
+@dataclass(frozen=True)
+class LineResistance(Effect):
+    """The transducer sits on the valve's side of a line and sees its turbulent loss, too."""
+
+    balance: ClassVar[Balance] = "chambers"
+    sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    source: ClassVar[str] = "dp = k Q|Q|"
+    trial: ClassVar[dict[str, float]] = {"coefficient": 0.3}
+
+    coefficient: float = quantity("time^2/pressure", 0.0, 20.0, "k", default=0.0)
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """Dry friction, the same at every speed."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("force",)
+    source: ClassVar[str] = OF_ORDER_ONE
+    trial: ClassVar[dict[str, float]] = {"force": 0.1}
+
+    force: float = quantity("pressure", 0.0, 10.0, "F_c over the area", default=0.0)
+
+
+@dataclass(frozen=True)
+class TurbulentResistance(Effect):
+    """A loss that grows with the square of the velocity: return line and meter-out edge."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    source: ClassVar[str] = "dp = k Q|Q|"
+    trial: ClassVar[dict[str, float]] = {"coefficient": 0.3}
+
+    coefficient: float = quantity("time^2/pressure", 0.0, 20.0, "k", default=0.0)
+
+
+@dataclass(frozen=True)
+class ExternalLoad(Effect):
+    """A constant force, and one that grows with the way the piston has moved."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("force", "gradient")
+    source: ClassVar[str] = "weight, and its lever arm that changes with the position"
+    trial: ClassVar[dict[str, float]] = {"force": 0.1, "gradient": 0.001}
+
+    force: float = quantity("pressure", -10.0, 10.0, "over the area", default=0.0)
+    gradient: float = quantity("1", -0.1, 0.1, "force per way, over the area", default=0.0)
+
+
+@dataclass(frozen=True)
+class ElasticBoom(Effect):
+    """Most of the mass moves behind a spring: an elastic arm."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("mass_ratio",)
+    source: ClassVar[str] = "first bending mode, lightly damped"
+    trial: ClassVar[dict[str, float]] = {"mass_ratio": 3.0, "frequency": 0.4, "damping": 0.05}
+
+    mass_ratio: float = quantity("1", 0.0, 20.0, "arm over piston", default=0.0)
+    frequency: float = quantity("rad/time", 0.01, 20.0, "of the arm, piston held", default=0.4)
+    damping: float = quantity("1", 1e-3, 0.5, "of critical", default=0.05)
+
+
+@dataclass(frozen=True)
+class SwingingLoad(Effect):
+    """A light mass hangs on what moves and swings, hardly damped."""
+
+    balance: ClassVar[Balance] = "force"
+    sizes: ClassVar[tuple[str, ...]] = ("mass_ratio",)
+    source: ClassVar[str] = "load on a rope: sqrt(g/l), damped by air alone"
+    trial: ClassVar[dict[str, float]] = {"mass_ratio": 0.05, "frequency": 0.2, "damping": 0.005}
+
+    mass_ratio: float = quantity("1", 0.0, 0.5, "load over what carries it", default=0.0)
+    frequency: float = quantity("rad/time", 0.01, 20.0, "of the pendulum", default=0.2)
+    damping: float = quantity("1", 1e-4, 0.1, "of critical", default=0.005)
+
+
+@dataclass(frozen=True)
+class Effects:
+    """All effects of an actuator by name; each is off by default."""
+
+    command_delay: CommandDelay = CommandDelay()
+    valve_null_offset: ValveNullOffset = ValveNullOffset()
+    valve_dead_zone_error: ValveDeadZoneError = ValveDeadZoneError()
+    valve_gain_asymmetry: ValveGainAsymmetry = ValveGainAsymmetry()
+    valve_hysteresis: ValveHysteresis = ValveHysteresis()
+    flow_limit: FlowLimit = FlowLimit()
+    supply_pressure_droop: SupplyPressureDroop = SupplyPressureDroop()
+    relief_valve: ReliefValve = ReliefValve()
+    internal_leakage: InternalLeakage = InternalLeakage()
+    line_resistance: LineResistance = LineResistance()
+    coulomb_friction: CoulombFriction = CoulombFriction()
+    turbulent_resistance: TurbulentResistance = TurbulentResistance()
+    external_load: ExternalLoad = ExternalLoad()
+    elastic_boom: ElasticBoom = ElasticBoom()
+    swinging_load: SwingingLoad = SwingingLoad()
+
+
+REGISTRY: dict[str, type[Effect]] = get_type_hints(Effects)

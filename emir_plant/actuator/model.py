@@ -1,0 +1,224 @@
+"""The actuator's equations and its free run.
+
+    spool      T dy/dt = u - y
+    flow       Q = gain o(y)
+    oil        dp/dt = Q - w - leakage
+    mass       dw/dt = omega^2 (p - friction(w) - load) - spring forces of arm and swinging load
+
+p: pressure above that at rest, w: velocity as a flow, o: opening behind play, delay, offset and
+overlap. One unit of flow raises the pressure by one per unit of time.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_common.parameter_tree import declared
+from emir_plant.actuator.parameters import Actuator
+from emir_plant.jit import compiled
+
+Array = NDArray[np.float64]
+
+STEPS = 2  # of the integration between two samples
+STATES = 8
+SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
+NOWHERE = 1e6  # a pressure that only a run out of all bounds has
+RELIEF = 5.0  # 1/time: flow of a relief valve per pressure above its setting
+SMOOTH = 0.03  # velocity below which dry friction is made smooth, in units of flow
+LAMINAR = 0.1  # relative drop below which the orifice's square root is made smooth
+
+
+class Rates(NamedTuple):
+    """Flow through the valve and what the state does, per time."""
+
+    flow: float
+    state: Array
+
+
+@cache
+def _fields(names: tuple[str, ...]) -> np.dtype[Any]:
+    return np.dtype([(name, np.float64) for name in names])
+
+
+def field(path: str) -> str:
+    """Return the record's field of a parameter given by its dotted path."""
+    return path.replace(".", "_")
+
+
+def record(actuator: Actuator) -> Any:
+    """Return the parameters as the flat record, (1,), that the compiled functions read."""
+    values = {field(path): value for path, (_, value) in declared(actuator).items()}
+    return np.array([tuple(values.values())], dtype=_fields(tuple(values)))
+
+
+def simulate(actuator: Actuator, command: Array, period: float, start: float = 0.0) -> Array:
+    """Return the measured pressure (n,) of a free run from standstill.
+
+    command: (n,) valve opening, straight between its samples. period: time between them. start:
+    pressure at the first sample.
+    """
+    return run(record(actuator), command, period, start)
+
+
+def run(parameters: Any, command: Array, period: float, start: float) -> Array:
+    """Return the same from parameters in a record: for fits, which simulate often."""
+    return np.asarray(_run(parameters, command, np.zeros(0), period, start)[:, 0])
+
+
+def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -> Array:
+    """Return the integral (n,) of the oil's modelled pressure rate under the measured pressure.
+
+    The measured pressure (n,) goes into every term, also into the force that moves the mass.
+    What the transducer sees of a line's loss is part of the integral.
+    """
+    return np.asarray(_run(record(actuator), command, pressure, period, 0.0)[:, 1])
+
+
+def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
+    """Return the flow and the state's derivative (8,) at a spool command."""
+    slope = np.zeros(STATES)
+    flow = _slope(state, state[PRESSURE], opening, record(actuator)[0], slope)
+    return Rates(flow, slope)
+
+
+@compiled
+def _flow(spool: float, pressure: float, p: Any) -> float:
+    """Return the flow that the valve gives, in the sense of rising pressure."""
+    sign = 1.0 if p.valve_gain > 0.0 else -1.0
+    opening = sign * (spool + p.effects_valve_null_offset_offset)
+    if opening > 0.0:
+        metered = max(opening - p.effects_valve_dead_zone_error_lifting, 0.0)
+        flow = abs(p.valve_gain) * metered
+        if p.effects_flow_limit_lifting > 0.0:
+            flow = min(flow, p.effects_flow_limit_lifting)
+        return flow * _orifice(1.0 - p.effects_supply_pressure_droop_lifting * pressure)
+    metered = max(-opening - p.effects_valve_dead_zone_error_lowering, 0.0)
+    flow = abs(p.valve_gain) * (1.0 + p.effects_valve_gain_asymmetry_lowering) * metered
+    if p.effects_flow_limit_lowering > 0.0:
+        flow = min(flow, p.effects_flow_limit_lowering)
+    return -flow * _orifice(1.0 + p.effects_supply_pressure_droop_lowering * pressure)
+
+
+@compiled
+def _orifice(drop: float) -> float:
+    """Return the flow's share at a relative pressure drop; 1 at a drop of 1."""
+    if drop == 1.0:
+        return 1.0
+    softened = np.sqrt(np.sqrt(drop * drop + LAMINAR * LAMINAR))
+    return drop / softened * np.sqrt(np.sqrt(1.0 + LAMINAR * LAMINAR))
+
+
+@compiled
+def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
+    """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
+    velocity = x[VELOCITY]
+    flow = _flow(x[SPOOL], pressure, p)
+    relief = 0.0
+    if p.effects_relief_valve_high > 0.0:
+        relief += RELIEF * max(pressure - p.effects_relief_valve_high, 0.0)
+    if p.effects_relief_valve_low > 0.0:
+        relief -= RELIEF * max(-pressure - p.effects_relief_valve_low, 0.0)
+    leakage = p.effects_internal_leakage_conductance * pressure + relief
+    resisting = (
+        p.load_viscous_friction * velocity
+        + p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
+        + p.effects_external_load_force
+        + p.effects_external_load_gradient * x[WAY]
+    )
+    if p.effects_coulomb_friction_force > 0.0:
+        resisting += p.effects_coulomb_friction_force * np.tanh(velocity / SMOOTH)
+    arm = p.effects_elastic_boom_frequency
+    pull = arm * arm * x[ARM_WAY]
+    pull += 2.0 * p.effects_elastic_boom_damping * arm * (velocity - x[ARM])
+    elastic = p.effects_elastic_boom_mass_ratio > 0.0
+    carrier = x[ARM] if elastic else velocity
+    swing = p.effects_swinging_load_frequency
+    tug = swing * swing * x[SWING_WAY]
+    tug += 2.0 * p.effects_swinging_load_damping * swing * (carrier - x[SWING])
+    on_carrier = p.effects_swinging_load_mass_ratio * tug
+    slope[SPOOL] = (command - x[SPOOL]) / p.valve_time_constant
+    slope[PRESSURE] = flow - velocity - leakage
+    slope[VELOCITY] = p.load_frequency * p.load_frequency * (pressure - resisting)
+    if elastic:
+        slope[VELOCITY] -= p.effects_elastic_boom_mass_ratio * pull
+        slope[ARM] = pull - on_carrier
+    else:
+        slope[VELOCITY] -= on_carrier
+        slope[ARM] = 0.0
+    slope[WAY] = velocity
+    slope[ARM_WAY] = velocity - x[ARM] if elastic else 0.0
+    slope[SWING] = tug
+    slope[SWING_WAY] = carrier - x[SWING]
+    return flow
+
+
+@compiled
+def _at(values: Any, time: float) -> float:
+    """Return a sampled signal between its samples; the first or last value beyond them."""
+    if time <= 0.0:
+        return values[0]
+    k = int(time)
+    if k >= values.size - 1:
+        return values[-1]
+    return values[k] + (values[k + 1] - values[k]) * (time - k)
+
+
+@compiled
+def _loss(flow: float, coefficient: float) -> float:
+    """Return the turbulent loss of a line."""
+    return coefficient * flow * abs(flow)
+
+
+@compiled
+def _ahead(x: Any, step: float, slope: Any, y: Any) -> None:
+    """Write x + step slope to y."""
+    for i in range(STATES):
+        y[i] = x[i] + step * slope[i]
+
+
+@compiled
+def _run(parameters: Any, command: Any, measured: Any, period: float, start: float) -> Any:
+    """Return measured pressure and the integral of its modelled rate, (n, 2), by RK4 steps.
+
+    measured: pressure that goes into every term, or nothing: then the simulated one does.
+    """
+    p = parameters[0]
+    shown = np.empty((command.size, 2))
+    x, y = np.zeros(STATES), np.zeros(STATES)
+    a, b, c, d = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES)
+    free = measured.size == 0
+    h = period / STEPS
+    lag = p.effects_command_delay_delay / period
+    play = p.effects_valve_hysteresis_play
+    line = p.effects_line_resistance_coefficient
+    held = command[0]
+    x[SPOOL] = held
+    x[PRESSURE] = start
+    for k in range(command.size):
+        now = x[PRESSURE] if free else measured[k]
+        seen = _loss(_flow(x[SPOOL], now, p), line)
+        shown[k, 0] = x[PRESSURE] + seen
+        shown[k, 1] = x[PRESSURE] + seen
+        for j in range(STEPS):
+            time = k + (j + 0.5) / STEPS
+            wanted = _at(command, time - lag)
+            held = min(max(held, wanted - play), wanted + play)
+            oil = 0.0
+            if not free:
+                oil = _at(measured, time)
+                oil -= _loss(_flow(x[SPOOL], oil, p), line)
+            _slope(x, x[PRESSURE] if free else oil, held, p, a)
+            _ahead(x, 0.5 * h, a, y)
+            _slope(y, y[PRESSURE] if free else oil, held, p, b)
+            _ahead(x, 0.5 * h, b, y)
+            _slope(y, y[PRESSURE] if free else oil, held, p, c)
+            _ahead(x, h, c, y)
+            _slope(y, y[PRESSURE] if free else oil, held, p, d)
+            for i in range(STATES):
+                x[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
+        if not abs(x[PRESSURE]) < NOWHERE:
+            shown[k + 1 :] = NOWHERE
+            break
+    return shown

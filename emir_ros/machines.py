@@ -1,0 +1,127 @@
+"""The simulated machines behind plant_node: joint 1 alone or the whole robot, by their signals."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from rclpy.node import Node
+
+from emir_analysis.robot_setup import Posture
+from emir_common.quantity import check_ranges, quantity
+from emir_msgs_py.robot_topics import ROBOT_VALVE_COMMAND
+from emir_msgs_py.topics import (
+    BOOM_DEFLECTION,
+    CYLINDER_STATES,
+    JOINT_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    TRUTH,
+    VALVE_COMMAND,
+    Topic,
+)
+from emir_plant.parameters import cautions
+from emir_plant.plant import Plant
+from emir_plant.robot import require_pinocchio
+from emir_plant.sensors import measure
+from emir_plant.sheet import joint1, load_sheet
+from emir_ros.node_parameters import declare, declare_robot, declare_tree
+from emir_ros.shell import Signals
+
+JOINT1_OUTPUTS = (
+    JOINT_STATES,
+    CYLINDER_STATES,
+    PRESSURE_LIFTING,
+    PRESSURE_LOWERING,
+    BOOM_DEFLECTION,
+    TRUTH,
+)
+TRUTH_SIGNALS = tuple(TRUTH.fields)  # in the order of emir_plant.core.Truth; a test holds that
+
+
+class Machine(Protocol):
+    """What plant_node steps."""
+
+    command: Topic
+    plant: Any
+
+    def step(self, commands: Signals, dt: float) -> None:
+        """Go on by dt, s, under the signals of the command topic."""
+
+    def signals(self, tick: int) -> Signals:
+        """Return the signals of sensors and truth at a plant period."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint1Start:
+    """Where joint 1 stands."""
+
+    initial_angle: float = quantity("rad", -0.5, 1.6, "boom angle at the start",
+                                    default=math.pi / 4)  # fmt: skip
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+class Joint1Machine:
+    """Joint 1, boom stretched, set up by the node's parameters."""
+
+    command = VALVE_COMMAND
+
+    def __init__(self, node: Node, pressure_lowering: float) -> None:
+        start = declare_tree(node, Joint1Start())
+        sheet = declare(node, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
+        base = load_sheet(Path(sheet)).machine if sheet else joint1()
+        self.plant = Plant(declare_tree(node, base))
+        for line in cautions(self.plant.machine):
+            node.get_logger().warning(line)
+        self.state = self.plant.initial(start.initial_angle, pressure_lowering)
+        self.truth = self.plant.outputs(self.state)
+
+    def step(self, commands: Signals, dt: float) -> None:
+        """Go on by dt, s."""
+        self.state, self.truth = self.plant.step(self.state, commands["valve_command"], dt)
+
+    def signals(self, tick: int) -> Signals:
+        """Return the signals of sensors and truth at a plant period."""
+        reading = measure(self.plant, self.truth, tick, self.state)
+        return reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
+
+
+class RobotMachine:
+    """The whole robot, set up by the node's parameters.
+
+    Those of its main joint have the names that joint 1's own model has. Raises ParameterError
+    without Pinocchio.
+    """
+
+    command = ROBOT_VALVE_COMMAND
+
+    def __init__(self, node: Node, pressure_lowering: float) -> None:
+        require_pinocchio()
+        from emir_analysis import robot_machine  # noqa: PLC0415 (needs Pinocchio)
+        from emir_plant.robot.plant import RobotPlant  # noqa: PLC0415
+
+        self._by_signals = robot_machine
+        start = declare_tree(node, Start()).initial_angles
+        self.plant = RobotPlant(declare_tree(node, declare_robot(node), without="main."))
+        for line in cautions(self.plant.robot.main):
+            node.get_logger().warning(line)
+        self.state = self.plant.initial(start.angles, pressure_lowering)
+        self.truth = self.plant.outputs(self.state)
+
+    def step(self, commands: Signals, dt: float) -> None:
+        """Go on by dt, s."""
+        valves = self._by_signals.commands(commands)
+        self.state, self.truth = self.plant.step(self.state, valves, dt)
+
+    def signals(self, tick: int) -> Signals:
+        """Return the signals of sensors and truth at a plant period."""
+        return self._by_signals.sensor_signals(self.plant, self.truth, tick)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where the robot stands."""
+
+    initial_angles: Posture = Posture()

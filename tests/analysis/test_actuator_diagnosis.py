@@ -1,0 +1,124 @@
+"""The diagnosis of an actuator, on recordings that other code has made."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import actuator_recorded as recorded
+import numpy as np
+import pytest
+
+from emir_analysis.cli import main
+from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
+from emir_analysis.diagnosis.actuator.fitting import fit
+from emir_analysis.diagnosis.actuator.record import open_record
+from emir_analysis.import_command import import_csv
+from emir_analysis.signals import load, read_signal_map
+from emir_plant import actuator
+from emir_plant.actuator import is_actuator, load_actuator
+
+Spoiler = Callable[[recorded.Array, recorded.Array], tuple[recorded.Array, recorded.Array]]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with data sheet and signal map."""
+    (tmp_path / "sheet.yaml").write_text(recorded.SHEET)
+    (tmp_path / "signals.yaml").write_text(recorded.SIGNALS)
+    return tmp_path
+
+
+def _diagnose(folder: Path, bag: Path, judge: Path | None) -> ActuatorDiagnosis:
+    return command(
+        bag,
+        folder / "sheet.yaml",
+        folder / "signals.yaml",
+        judge,
+        json=folder / "found.json",
+        html=folder / "found.html",
+        model_out=folder / "model.yaml",
+        predictions=folder / "runs",
+        progress=lambda _: None,
+    )
+
+
+def _proportional(spool: float, _: float) -> float:
+    return recorded.GAIN * spool
+
+
+def _limited(spool: float, _: float) -> float:
+    return float(np.clip(recorded.GAIN * spool, -0.8, 0.5))
+
+
+def test_a_machine_as_its_sheet_says_lacks_nothing(folder: Path) -> None:
+    result = _diagnose(folder, *recorded.record(folder, _proportional))
+    assert result.verdict == "nothing_missing", summary(result)
+    assert result.effects == ()
+    assert result.parameters["valve.gain"].value == pytest.approx(recorded.GAIN, rel=0.02)
+    signal = result.signals["oil_pressure"]
+    assert signal.refitted < 1.1 * recorded.NOISE < 0.5 * signal.nominal
+    assert signal.black_box < 1.2 * recorded.NOISE  # the machine is linear
+
+
+def test_an_effect_is_found_and_carries_to_the_other_recording(
+    folder: Path,
+) -> None:
+    bag, judge = recorded.record(folder, _limited)
+    result = _diagnose(folder, bag, judge)
+    assert result.verdict == "found", summary(result)
+    (effect,) = result.effects
+    assert (effect.name, effect.balance) == ("flow_limit", "supply")
+    assert effect.parameters["lifting"].value == pytest.approx(0.5, rel=0.03)
+    assert effect.parameters["lowering"].value == pytest.approx(0.8, rel=0.03)
+    signal = result.signals["oil_pressure"]
+    assert signal.with_effect < 1.2 * recorded.NOISE < 0.2 * signal.refitted
+    assert not result.judged_from_its_own_start
+    written = json.loads((folder / "found.json").read_text())
+    assert written["signals"]["oil_pressure"].keys() == {
+        "unit", "noise", "nominal", "refitted", "with_effect", "black_box",
+    }  # fmt: skip
+    assert written["balances"]["oil"].keys() == {"unit", "noise", "before", "refitted", "after"}
+    assert (folder / "found.html").read_text().count("<img") == 1
+    model = load_actuator(folder / "model.yaml").machine
+    assert model.effects.flow_limit.lifting == effect.parameters["lifting"].value
+    runs = load(folder / "runs", {"with": ("/oil_pressure/with_effect", "position[0]", "1")})
+    measured = open_record(judge, read_signal_map(folder / "signals.yaml"))
+    error = runs["with"].value - measured.pressure
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(signal.with_effect, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda u, p: (0.0 * u, p), "valve_opening is constant"),
+        (lambda u, p: (u, 0.0 * p + 3.0), "oil_pressure is constant"),
+        (lambda u, p: (u[:50], p[:50]), "record at least 200"),
+    ],
+)
+def test_a_recording_of_no_use_is_told(
+    folder: Path, spoil: Spoiler, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opening = recorded.moves(300, 1)
+    recorded.write(folder / "bag", *spoil(opening, np.sin(opening)))
+    words = ["--datasheet", str(folder / "sheet.yaml"), "--signals", str(folder / "signals.yaml")]
+    assert main(["diagnose", str(folder / "bag"), *words]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert reason in told[-1]
+
+
+def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> None:
+    """On the estimation half alone: the validation half is no business of a test."""
+    (tmp_path / "signals.yaml").write_text(
+        "time: {column: k, unit: sample}\n"
+        'valve_opening: {column: u, topic: /opening, field: data, unit: "1"}\n'
+        'oil_pressure: {column: p, topic: /pressure, field: data, unit: "1"}\n'
+    )
+    table = shared / "measured" / "crane-actuator" / "actuator.csv"
+    import_csv(table, tmp_path / "signals.yaml", tmp_path / "bag", slice(0, 512))
+    record = open_record(tmp_path / "bag", read_signal_map(tmp_path / "signals.yaml"))
+    own = Path(actuator.__file__).parent / "data" / "crane_actuator.yaml"
+    assert is_actuator(own)
+    sheet = load_actuator(own)
+    plain = fit(sheet, (), record, sheet.machine, restarts=8)
+    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, plain.machine, restarts=8)
+    assert limited.rms < 0.7 * plain.rms < 0.7 * np.std(record.pressure)

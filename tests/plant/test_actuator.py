@@ -1,0 +1,117 @@
+"""The actuator against its equations written a second time, and its data sheet."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError, quantities
+from emir_plant.actuator import (
+    REGISTRY,
+    Actuator,
+    ActuatorSheet,
+    load_actuator,
+    simulate,
+    write_actuator,
+)
+from emir_plant.actuator.model import driven
+from emir_plant.actuator.parameters import Load, Valve
+
+PLAIN = Actuator(Valve(gain=1.5, time_constant=2.0), Load(frequency=0.3, viscous_friction=0.4))
+TIME = np.arange(300.0)
+OPENING = np.interp(TIME, [0, 20, 60, 90, 150, 180, 299], [0, 0, 0.8, 0.8, -0.9, 0.1, 0.1])
+
+
+def _with(effect: str, **values: float) -> Actuator:
+    trial = REGISTRY[effect].trial | values
+    return with_values(PLAIN, {f"effects.{effect}.{name}": v for name, v in trial.items()})
+
+
+def test_free_run_agrees_with_an_independent_solver() -> None:
+    machine = with_values(PLAIN, {
+        "effects.elastic_boom.mass_ratio": 3.0, "effects.elastic_boom.frequency": 0.4,
+        "effects.elastic_boom.damping": 0.05, "effects.swinging_load.mass_ratio": 0.1,
+        "effects.swinging_load.frequency": 0.2, "effects.swinging_load.damping": 0.01,
+        "effects.turbulent_resistance.coefficient": 0.3, "effects.valve_null_offset.offset": 0.05,
+        "effects.internal_leakage.conductance": 0.02, "effects.external_load.force": 0.1,
+        "effects.command_delay.delay": 2.5, "effects.line_resistance.coefficient": 0.5,
+    })  # fmt: skip
+
+    def slope(t: float, x: np.ndarray) -> list[float]:
+        spool, oil, piston, arm, arm_way, swing, swing_way = x
+        flow = 1.5 * (spool + 0.05)
+        pull = 0.4**2 * arm_way + 2 * 0.05 * 0.4 * (piston - arm)
+        tug = 0.2**2 * swing_way + 2 * 0.01 * 0.2 * (arm - swing)
+        force = oil - 0.4 * piston - 0.3 * piston * abs(piston) - 0.1
+        return [
+            (np.interp(t - 2.5, TIME, OPENING) - spool) / 2.0,
+            flow - piston - 0.02 * oil,
+            0.3**2 * force - 3.0 * pull,
+            pull - 0.1 * tug,
+            piston - arm,
+            tug,
+            arm - swing,
+        ]
+
+    run = solve_ivp(slope, (0, 299), np.zeros(7), t_eval=TIME, max_step=0.25, rtol=1e-8)
+    flow = 1.5 * (run.y[0] + 0.05)
+    expected = run.y[1] + 0.5 * flow * np.abs(flow)
+    np.testing.assert_allclose(simulate(machine, OPENING, 1.0), expected, atol=0.02)
+
+
+def test_the_measured_pressure_of_its_own_machine_leaves_nothing_missing() -> None:
+    machine = _with("flow_limit", lifting=0.6, lowering=0.8)
+    pressure = simulate(machine, OPENING, 1.0)
+    missing = np.abs(pressure - driven(machine, OPENING, pressure, 1.0)).max()
+    other = np.abs(pressure - driven(PLAIN, OPENING, pressure, 1.0)).max()
+    assert missing < 0.05 * other
+
+
+@pytest.mark.parametrize("effect", REGISTRY)
+def test_effects_are_off_at_zero_and_change_something_when_on(effect: str) -> None:
+    kind = REGISTRY[effect]
+    assert kind.source
+    assert set(kind.trial) == set(quantities(kind))
+    off = simulate(_with(effect, **dict.fromkeys(kind.sizes, 0.0)), OPENING, 1.0)
+    plain = simulate(PLAIN, OPENING, 1.0)
+    np.testing.assert_array_equal(off, plain)
+    small = {"relief_valve": {"high": 0.5, "low": 0.5}, "flow_limit": {"lifting": 0.5}}
+    on = simulate(_with(effect, **small.get(effect, {})), OPENING, 1.0)
+    assert np.all(np.isfinite(on))
+    assert np.abs(on - plain).max() > 1e-3
+
+
+def test_a_flow_limit_limits_the_steady_velocity_and_so_the_pressure() -> None:
+    opening = np.minimum(TIME / 20.0, 1.0)
+    settled = simulate(_with("flow_limit", lifting=0.6), opening, 1.0)[-1]
+    assert settled == pytest.approx(0.4 * 0.6, rel=0.05)  # pressure = friction * flow
+
+
+def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
+    sheet = ActuatorSheet(_with("valve_hysteresis"), {"valve.gain": (0.5, 3.0)}, "sample")
+    write_actuator(tmp_path / "sheet.yaml", sheet)
+    assert load_actuator(tmp_path / "sheet.yaml") == sheet
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("valve: {gain: 1.0, time_constant: 1.0}", "load.frequency: missing"),
+        ("valve: {gain: much, time_constant: 1.0}\nload: {frequency: 1.0}", "not a number"),
+        ("valve: {gain: 1.0, time_constant: 0.0}\nload: {frequency: 1.0}", "outside"),
+        ("valve: {volume: 1.0}", "valve.volume: there is no such parameter"),
+        ("effects: {magic: {size: 1.0}}", "effects.magic: there is no such effect"),
+        ("time_unit: hours", "time_unit"),
+        (
+            "valve: {gain: {value: 9, range: [1, 2]}, time_constant: 1.0}\nload: {frequency: 1.0}",
+            "outside its range",
+        ),
+    ],
+)
+def test_a_sheet_of_no_use_is_told(text: str, reason: str, tmp_path: Path) -> None:
+    (tmp_path / "sheet.yaml").write_text(f"machine: actuator\n{text}\n")
+    with pytest.raises(ParameterError, match=reason) as told:
+        load_actuator(tmp_path / "sheet.yaml")
+    assert "\n" not in str(told.value)

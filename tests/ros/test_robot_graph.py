@@ -1,0 +1,147 @@
+"""The graph with the whole robot: the plain loop's values, and what may be wrong with its input."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir_ros[robot]'")
+
+from rosbags.highlevel import AnyReader
+
+from emir_analysis.info import info
+from emir_analysis.robot_controls import (
+    RobotCascadeControl,
+    RobotForceLoopControl,
+    RobotTrajectoryControl,
+)
+from emir_analysis.robot_machine import RobotLoop
+from emir_analysis.robot_setup import (
+    Posture,
+    cascade_parameters,
+    force_loops,
+    path_parameters,
+    trajectory,
+)
+from emir_control.cascade import Cascade
+from emir_control.trajectory import TrajectoryParameters
+from emir_msgs_py import conversions
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS
+from emir_plant.robot.plant import RobotPlant
+from emir_plant.robot.sheet import robot
+from emir_ros.run import main as run_graph
+
+DURATION = 1.6  # s: into the ramp of the move
+
+
+def test_lockstep_graph_equals_the_plain_loop(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / "run"
+    words = ["--model", "robot", "--trajectory", "line", "--duration", str(DURATION)]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    assert "tcp_path_error_peak" in capfd.readouterr().out
+    assert info(bag).about["model"] == "robot"
+    sheet = robot()
+    planned = trajectory(sheet, "line", TrajectoryParameters(), path_parameters(sheet))
+    loop = RobotLoop(
+        RobotPlant(sheet),
+        [
+            RobotTrajectoryControl(planned),
+            RobotCascadeControl(Cascade(cascade_parameters())),
+            RobotForceLoopControl(force_loops(sheet)),
+        ],
+    ).run(Posture().angles, 2e6, DURATION)
+    with AnyReader([bag]) as reader:
+        messages: dict[str, list[object]] = {}
+        for connection, _, data in reader.messages():
+            decoded = reader.deserialize(data, connection.msgtype)
+            messages.setdefault(connection.topic, []).append(decoded)
+    assert messages.keys() == {f"/{topic.name}" for topic in ROBOT_TOPICS}
+    for topic in ROBOT_TOPICS:
+        period = PLANT_PERIOD_NS if topic.every == "plant" else CONTROL_PERIOD_NS
+        found = messages[f"/{topic.name}"]
+        stamps = [conversions.stamp_ns(message) for message in found]
+        assert stamps == [k * period for k in range(round(DURATION * 1e9 / period) + 1)]
+        for name in topic.fields:
+            values = [conversions.values(topic, message)[name] for message in found]
+            assert np.array_equal(values, loop[name]), name
+
+
+BAD = {
+    "model": (["--model", "crane"], "", "model 'crane': there are joint1, robot"),
+    "controller": (["--controller", "pfc"], "", "controller 'pfc': the whole robot has cascade"),
+    "trajectory": (["--trajectory", "loop"], "", "there are lift-lower, lower-lift, hold, line"),
+    "posture": (
+        ["--trajectory", "hold"],
+        "plant_node: {ros__parameters: {initial_angles: {joint3: 1.5}}}",
+        r"joint 3: 85.9 deg is outside the linkage's reach, -61.1 \.\.\. 72.6 deg",
+    ),
+    "line": (
+        ["--trajectory", "line"],
+        "trajectory_node: {ros__parameters: {line: {x: 25.0}}}",
+        "trajectory_node: line: the arm does not reach",
+    ),
+    "joint 1's parameter": (
+        [],
+        "plant_node: {ros__parameters: {initial_angle: 0.5}}",
+        "plant_node: initial_angle: there is no such parameter",
+    ),
+    "effect": (
+        [],
+        "plant_node: {ros__parameters: {effects: {command_delay: {delay: 0.01}}}}",
+        "effects.command_delay: not in the model of the whole robot",
+    ),
+    "file": (
+        [],
+        "plant_node: {ros__parameters: {robot_file: nowhere.yaml}}",
+        "nowhere.yaml: No such file",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_clear_line(
+    case: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words, parameters, said = BAD[case]
+    bag = tmp_path / "run"
+    if parameters:
+        file = tmp_path / "params.yaml"
+        file.write_text(parameters)
+        words = [*words, "--params", str(file)]
+    assert run_graph(["--model", "robot", *words, "--duration", "1", "--bag", str(bag)]) == 1
+    error = capfd.readouterr().err
+    assert re.search(said, error)
+    assert len(error.strip().splitlines()) == 1
+    assert not bag.exists()
+
+
+def test_missing_pinocchio_is_one_clear_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        "emir_plant.robot.find_spec", lambda name: None if name == "pinocchio" else find(name)
+    )
+    assert run_graph(["--model", "robot", "--bag", str(tmp_path / "run")]) == 1
+    assert "pip install 'emir_ros[robot]'" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("model", ["joint1", "robot"])
+def test_payload_beyond_the_machine_is_warned_of(
+    model: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "params.yaml"
+    file.write_text(
+        "plant_node: {ros__parameters: {geometry.payload: 1600.0, supply.p0: 4.5e+7,"
+        " resistances.k_pump_line: 3.6e+10}}"
+    )
+    words = ["--model", model, "--params", str(file), "--duration", "0.1"]
+    assert run_graph([*words, "--bag", str(tmp_path / "run")]) == 0
+    error = capfd.readouterr().err
+    assert error.count("payload = 1600 kg: the machine is made for 1500 kg") == 1

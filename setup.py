@@ -29,6 +29,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", matching("emir_ros/launch/*.launch.py")),
         (f"share/{NAME}/config", matching("emir_ros/config/*.yaml")),
+        (f"share/{NAME}/layouts", matching("emir_ros/layouts/*")),
         (f"lib/{NAME}", matching("emir_ros/executables/*_node")),
     ],
     entry_points={"console_scripts": ["emir = emir_analysis.cli:main"]},

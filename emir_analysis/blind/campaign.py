@@ -1,17 +1,22 @@
 """Many machines, on all cores or on a cluster; every outcome is on disk before the next."""
 
 import json
+import os
+import signal
+import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, fields
 from hashlib import sha256
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from emir_analysis.blind.trial import Outcome, Plan, trial
 from emir_analysis.errors import InputError
 
+INTERRUPTED = 130  # exit code
 PATIENCE = 10.0  # s, until a scheduler has to answer
 
 Progress = Callable[[str], None]
@@ -30,7 +35,7 @@ def campaign(  # noqa: PLR0913 (who, what, where)
     """Diagnose machines 0 ... machines - 1 of a plan, but those that the log already has.
 
     log: JSON lines, the plan and then one line per machine. Raises InputError for a log of
-    another plan.
+    another plan or when a worker dies.
     """
     done = {outcome.machine: outcome for outcome in read_log(log, plan)}
     missing = [number for number in range(machines) if number not in done]
@@ -39,7 +44,7 @@ def campaign(  # noqa: PLR0913 (who, what, where)
     with log.open("a", encoding="utf-8") as lines:
         if not log.stat().st_size:
             lines.write(_header(plan) + "\n")
-        futures = [executor.submit(trial, plan, number, threads, keep) for number in missing]
+        futures = [executor.submit(_work, plan, number, threads, keep) for number in missing]
         try:
             for future in as_completed(futures):
                 outcome = future.result()
@@ -47,6 +52,10 @@ def campaign(  # noqa: PLR0913 (who, what, where)
                 lines.flush()
                 done[outcome.machine] = outcome
                 progress(f"{len(done):4d} of {machines}  {line(outcome)}")
+        except BrokenExecutor:
+            raise InputError(
+                f"a worker died; {log} has what was done, the same command goes on"
+            ) from None
         finally:
             for future in futures:
                 future.cancel()
@@ -90,6 +99,18 @@ def _header(plan: Plan) -> str:
     return json.dumps(described)
 
 
+def _work(plan: Plan, number: int, threads: int, keep: Path | None) -> Outcome:
+    try:
+        return trial(plan, number, threads, keep)
+    except SystemExit:  # by Ctrl-C, see below; what was temporary is gone
+        os._exit(INTERRUPTED)
+
+
+def _end_when_interrupted() -> None:
+    """Let a process of this machine end at Ctrl-C without a word, even while it waits for work."""
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(INTERRUPTED))
+
+
 @contextmanager
 def workers(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Yield who does the work: processes of this machine, or the cluster of a Dask scheduler.
@@ -97,7 +118,8 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     Raises InputError without Dask, or where no scheduler answers.
     """
     if scheduler is None:
-        with ProcessPoolExecutor(jobs) as executor:
+        # not forked: there may be threads
+        with ProcessPoolExecutor(jobs, get_context("spawn"), _end_when_interrupted) as executor:
             yield executor
         return
     try:

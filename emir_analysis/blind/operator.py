@@ -1,7 +1,5 @@
 """Who moves the machine: from target to target at random speeds, by the stroke that is shown."""
 
-import math
-
 import numpy as np
 
 from emir_analysis.blind.numbers import Numbers
@@ -12,11 +10,12 @@ RANGE = (0.25, 1.30)  # rad, in which the targets lie
 REST = 1.0  # s, before the first move
 PAUSES = 0.5  # share of moves after which the machine rests
 LONGEST = 6.0  # s, of one move
-NEAR = 5e-4  # m from a target, where the valve is shut
+PERIOD = 0.032  # s, between commands
+LEAST = 2e-3  # of the nominal speed, for which the valve is opened
 
 
 class Operator:
-    """Follows a trapezoid of speed from target to target; feedback keeps it from drifting off.
+    """Follows a trapezoid of speed from target to target, by feedback; between, the valve is shut.
 
     abrupt: speed in jumps instead of ramps. Commands in [-1, 1], zero while it waits.
     """
@@ -24,35 +23,33 @@ class Operator:
     def __init__(self, random: Random, stated: Numbers, strokes: tuple[float, float],
                  *, abrupt: bool) -> None:  # fmt: skip
         self._random, self._stated, self._strokes = random, stated, strokes
-        self._abrupt = abrupt
         self._feedback = random.uniform(0.1, 0.25)  # 1/s, well below the slow mode
         self._ramp = 0.0 if abrupt else random.uniform(0.3, 0.8)  # s
         self._fastest = random.uniform(0.4, 0.7) if abrupt else random.uniform(0.6, 0.95)
-        self._reference = math.nan  # m, where the machine ought to be; unknown at first
+        self._reference = 0.0  # m, where the machine ought to be while it moves
         self._begin, self._end, self._speed = 0.0, REST, 0.0
 
     def command(self, time: float, shown: float) -> float:
         """Return the valve command y2 at a time, s, by the stroke shown, m."""
         n = self._stated
-        if math.isnan(self._reference):
-            self._reference = shown
         if time >= self._end:
-            self._next_move(time)
-        speed = self._speed * self._envelope(time)
-        self._reference += speed * 0.032
-        off = self._reference - shown
-        if speed == 0.0 and abs(off) < NEAR:
+            self._next_move(time, shown)
+        if self._speed == 0.0:
             return 0.0
+        speed = self._speed * self._envelope(time)
+        self._reference += speed * PERIOD
         nominal = n.flow_nominal / n.area_lifting
-        wanted = (speed + self._feedback * off) / nominal
+        wanted = (speed + self._feedback * (self._reference - shown)) / nominal
         if wanted < 0.0:
             wanted *= n.area_lowering / n.area_lifting / n.flow_ratio_lowering
-        if abs(wanted) < 2e-3:  # noqa: PLR2004 (too little to open the valve for)
+        if abs(wanted) < LEAST:
             return 0.0
         return float(np.clip(np.sign(wanted) * n.dead_zone + wanted * (1 - n.dead_zone), -1, 1))
 
-    def _next_move(self, time: float) -> None:
+    def _next_move(self, time: float, shown: float) -> None:
         waited = self._speed == 0.0
+        if waited:
+            self._reference = shown
         self._begin = time
         if not waited and self._random.uniform() < PAUSES:
             self._speed, self._end = 0.0, time + self._random.uniform(0.3, 2.5)

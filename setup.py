@@ -67,6 +67,8 @@ setup(
             "pytest-timeout>=2.3",
             "rosbags>=0.10",
         ],
+        # What `emir bench diagnosis` stands beside; these hold numpy back (an environment apart).
+        "identification": ["pysindy>=2.1", "sysidentpy>=0.9"],
         # What `emir bench` stands beside; what is missing, it says.
         "bench": ["do-mpc>=5.0", "mujoco>=3.2", "osqp>=1.0", "rosbags>=0.10"],
         # What ruff and mypy report changes with every minor release: raise them on purpose.

@@ -24,6 +24,7 @@ from emir_analysis.node_controls import (
     TrajectoryControl,
 )
 from emir_analysis.replay_plant import replay_plant
+from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_analysis.switching import Ready
@@ -38,6 +39,7 @@ from emir_control.pfc import PfcParameters
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
@@ -63,9 +65,11 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
+    about = bags.metadata(bag).get("emir", {})
+    if full_name(TCP_POSE, bags.recorded_topics(bag)):
+        return replay_robot(bag, node, {**_recorded_parameters(bag, node, about), **changed})
     if node == PLANT:
         return replay_plant(bag, changed)
-    about = bags.metadata(bag).get("emir", {})
     control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
     law: Stepping = control
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)

@@ -87,6 +87,8 @@ class PlantNode(Shell):
         signals = self.machine.signals(self.tick)
         for topic in self._topics:
             self.publish(topic, stamp, signals)
+        if self.tick % (CONTROL_PERIOD_NS // PLANT_PERIOD_NS) == 0:
+            self.machine.show(stamp)
 
     def _show_progress(self) -> None:
         if time.monotonic() - self._said > 1.0:

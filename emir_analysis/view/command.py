@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from emir_analysis.errors import InputError
-from emir_analysis.run_signals import load_run
+from emir_analysis.run_signals import is_robot, load_run
 from emir_analysis.view.arm import Outline
 from emir_analysis.view.frames import frames
 from emir_plant.sheet import joint1
@@ -32,6 +32,8 @@ def command(words: list[str], live: Callable[[list[str]], int]) -> int:
     if options.live:
         return live(["--ros-args", "-p", f"port:={options.port}"])
     recording = load_run(options.bag)
+    if is_robot(recording):
+        raise InputError(f"{options.bag}: a run of the whole robot: the page shows joint 1 only")
     outline = outline_of_joint1()
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,6 +1,7 @@
 """The whole graph in real time, each node a process of its own.
 
 ros2 launch emir_ros emir.launch.py bag:=my_run controller:=cascade namespace:=arm
+ros2 launch emir_ros emir.launch.py bag:=my_run model:=robot
 
 With `standby:=pfc` a second controller holds its state ready, and selector_node, whose parameter
 `controller` may be set at any time, chooses.
@@ -25,7 +26,8 @@ PACKAGE = "emir_ros"
 
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments and the nodes: five, or seven with a second controller."""
-    parameters = Path(get_package_share_directory(PACKAGE)) / "config" / "emir.yaml"
+    config = Path(get_package_share_directory(PACKAGE)) / "config"
+    parameters = [f"{config}/", LaunchConfiguration("model"), ".yaml"]
     controller, second = LaunchConfiguration("controller"), LaunchConfiguration("standby")
     two = NotEqualsSubstitution(second, "")
     if_two = IfCondition(two)
@@ -35,7 +37,8 @@ def generate_launch_description() -> LaunchDescription:
             _argument("controller", "cascade", "cascade, pfc, pfc_tip, lqg, mpc"),
             _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
-            _argument("params", str(parameters), "YAML file with the nodes' parameters"),
+            _argument("model", "joint1", "joint1, or robot: the whole robot, with cascade"),
+            _argument("params", parameters, "YAML file with the nodes' parameters"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
             _node("force_loop_node", None, IfCondition(_gives_velocity(controller))),
@@ -52,7 +55,9 @@ def _gives_velocity(controller: LaunchConfiguration) -> PythonExpression:
     return PythonExpression(["'", controller, "' not in ('lqg', 'mpc')"])
 
 
-def _argument(name: str, default: str | None, description: str) -> DeclareLaunchArgument:
+def _argument(
+    name: str, default: str | list[object] | None, description: str
+) -> DeclareLaunchArgument:
     return DeclareLaunchArgument(name, default_value=default, description=description)
 
 
@@ -65,7 +70,10 @@ def _node(
         package=PACKAGE,
         executable=executable,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[LaunchConfiguration("params"), parameters or {}],
+        parameters=[
+            LaunchConfiguration("params"),
+            {"model": LaunchConfiguration("model")} | (parameters or {}),
+        ],
         condition=condition,
         output="screen",
     )

@@ -273,6 +273,7 @@ def test_an_interrupted_run_keeps_what_it_has(
 
 BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
+    "namespace": (["--namespace", "2nd"], "", "namespace '2nd': letters, digits"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
@@ -368,6 +369,40 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     again = tmp_path / "again.yaml"
     again.write_text(parameters_text(info(bag)))
     assert read_parameters(again) == parameters  # the file sets up the same run
+
+
+def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> None:
+    """Each in its namespace, at the same time: each records what it records alone."""
+    short = ["--duration", "2", "--bag"]
+    assert run_graph([*short, str(tmp_path / "alone")]) == 0
+    gains = {"left": 2.0, "right": 1.0}
+    for name, gain in gains.items():
+        (tmp_path / f"{name}.yaml").write_text(
+            f"cascade_node: {{ros__parameters: {{gain: {gain}}}}}\n"
+        )
+    commands = {
+        name: ["--namespace", name, "--params", str(tmp_path / f"{name}.yaml"), *short]
+        for name in gains
+    }
+    with (
+        _started([*commands["left"], str(tmp_path / "left")]) as left,
+        _started([*commands["right"], str(tmp_path / "right")]) as right,
+    ):
+        said = left.communicate(timeout=120), right.communicate(timeout=120)
+    assert left.returncode == right.returncode == 0, said
+    alone = _raw(tmp_path / "alone")
+    same_machine, other_gain = _raw(tmp_path / "left"), _raw(tmp_path / "right")
+    assert same_machine == {f"/left{topic}": data for topic, data in alone.items()}
+    assert other_gain.keys() == {f"/right{topic}" for topic in alone}
+    assert other_gain["/right/truth"] != alone["/truth"]
+
+
+def _raw(bag: Path) -> dict[str, list[bytes]]:
+    found: dict[str, list[bytes]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages():
+            found.setdefault(connection.topic, []).append(bytes(data))
+    return found
 
 
 def test_parameters_reach_the_nodes(tmp_path: Path) -> None:

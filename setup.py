@@ -54,10 +54,13 @@ setup(
         "design": ["control>=0.10"],
         # `emir view`: the page in the browser.
         "view": ["viser>=1.1"],
+        # The model predictive control (`--controller mpc`); the others do without.
+        "mpc": ["osqp>=1.0"],
         "test": [
             "control>=0.10",
             "distributed>=2024.8",
             "mujoco>=3.2",
+            "osqp>=1.0",
             "pandas>=2.2",
             "playwright>=1.40",
             "pytest>=8.2",

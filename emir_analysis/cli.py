@@ -22,6 +22,7 @@ USAGE = """usage: emir COMMAND ...
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   limit      the smallest deflection of the TCP that any command could reach for a move
   yardstick  controllers against that limit, over random draws of the machine
+  disturb    a push, a load dropped or picked up: what each controller makes of it
   design     a predictive controller for a machine, and where it is stable
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
@@ -47,6 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "compare": _compare,
         "limit": _limit,
         "yardstick": _yardstick,
+        "disturb": _disturb,
         "design": _design,
         "linearize": _linearize,
         "figures": _figures,
@@ -244,6 +246,13 @@ def _limit(words: list[str]) -> int:
 
 def _yardstick(words: list[str]) -> int:
     from emir_analysis.yardstick_command import command
+
+    print(command(words, _progress))
+    return 0
+
+
+def _disturb(words: list[str]) -> int:
+    from emir_analysis.disturb_command import command
 
     print(command(words, _progress))
     return 0

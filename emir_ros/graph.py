@@ -24,10 +24,12 @@ from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-CONTROLLERS = {
+VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
+CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
+CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_CONTROLLERS}
 NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
@@ -85,7 +87,11 @@ class Plan:
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
     _check_model(plan)
-    Selector(plan.controllers, _from_the_start(plan))
+    for name in plan.controllers:
+        if name in VALVE_CONTROLLERS and plan.switches:
+            raise ParameterError(f"controller {name!r}: cannot be switched to or from")
+    if plan.controller not in VALVE_CONTROLLERS:
+        Selector(plan.controllers, _from_the_start(plan))
     if not re.fullmatch(r"([A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", plan.namespace, re.ASCII):
         raise ParameterError(
             f"namespace {plan.namespace!r}: letters, digits and _, not a digit first"

@@ -13,7 +13,11 @@ from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution
+from launch.substitutions import (
+    LaunchConfiguration,
+    NotEqualsSubstitution,
+    PythonExpression,
+)
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -30,20 +34,25 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             _argument("bag", None, "folder of the recording; must not exist"),
-            _argument("controller", "cascade", "outer controller: cascade, pfc, pfc_tip"),
+            _argument("controller", "cascade", "cascade, pfc, pfc_tip, lqg, mpc"),
             _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
             _argument("model", "joint1", "joint1, or robot: the whole robot, with cascade"),
             _argument("params", parameters, "YAML file with the nodes' parameters"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
-            _node("force_loop_node"),
+            _node("force_loop_node", None, IfCondition(_gives_velocity(controller))),
             _node([controller, "_node"], {"standby": ParameterValue(two, value_type=bool)}),
             _node([second, "_node"], {"standby": True}, if_two),
             _node("selector_node", {"controller": controller}, if_two),
             _node("trajectory_node"),
         ]
     )
+
+
+def _gives_velocity(controller: LaunchConfiguration) -> PythonExpression:
+    """Tell whether the force loop is needed: lqg and mpc give the valve command themselves."""
+    return PythonExpression(["'", controller, "' not in ('lqg', 'mpc')"])
 
 
 def _argument(

@@ -24,8 +24,9 @@ from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.info import info, parameters_text
+from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
-from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
+from emir_analysis.outer_loop import CascadeLoop, LqgLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
@@ -33,6 +34,8 @@ from emir_analysis.stamped import same
 from emir_analysis.switching import Switch, SwitchedLoop
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
+from emir_control.lqg import Lqg
+from emir_control.mpc import Mpc
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
@@ -61,6 +64,8 @@ def _loop_signals(controller: str) -> dict[str, np.ndarray]:
         "pfc_tip": lambda: PfcTipLoop(
             Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
         ),
+        "lqg": lambda: LqgLoop(Lqg(lqg_parameters(joint1()))),
+        "mpc": lambda: LqgLoop(Mpc(lqg_parameters(joint1())), "mpc"),
     }[controller]()
     trajectory = named("lift-lower", TrajectoryParameters())
     return ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, DURATION)
@@ -93,7 +98,15 @@ def _assert_equal(bag: Path, controller: str) -> None:
 
 @pytest.mark.parametrize(
     ("controller", "processes"),
-    [("cascade", "one"), ("cascade", "many"), ("pfc", "one"), ("pfc", "many"), ("pfc_tip", "one")],
+    [
+        ("cascade", "one"),
+        ("cascade", "many"),
+        ("pfc", "one"),
+        ("pfc", "many"),
+        ("pfc_tip", "one"),
+        ("lqg", "one"),
+        ("mpc", "one"),
+    ],
 )
 def test_lockstep_graph_equals_the_plain_loop(
     controller: str, processes: str, tmp_path: Path
@@ -105,7 +118,8 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert finished.returncode == 0, finished.stderr
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
-    for node in ("trajectory", controller, "force_loop", "plant"):
+    others = () if controller in {"lqg", "mpc"} else ("force_loop",)
+    for node in ("trajectory", controller, *others, "plant"):
         assert same(replay(bag, node, {})), node
 
 

@@ -37,7 +37,7 @@ def launch(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
 def test_every_executable_is_started(launch: MagicMock) -> None:
     started = {"".join(call.kwargs["executable"]) for call in launch.Node.call_args_list}
     executables = {path.name for path in EXECUTABLES.glob("*_node")}
-    outer = {f"{name}_node" for name in ("cascade", "pfc", "pfc_tip")}
+    outer = {f"{name}_node" for name in ("cascade", "pfc", "pfc_tip", "lqg", "mpc")}
     beside = {"replay_node", "view_node"}  # for those who look at it
     chosen = {"<controller>_node", "<standby>_node"}
     assert started - chosen | outer | beside == executables

@@ -6,21 +6,25 @@ The nodes of the graph and the replay of a recording both hold these objects.
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from emir_analysis.outer_loop import pfc_signals
+from emir_analysis.outer_loop import lqg_signals, pfc_signals
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
+from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc, PfcInputs
 from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.tip import Tip, TipInputs
-from emir_control.trajectory import AwayAndBack, Reference, TrajectoryInputs
+from emir_control.trajectory import AwayAndBack, Move, Reference, TrajectoryInputs
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CASCADE_TERMS,
+    CYLINDER_MOVE,
     CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
     FORCE_LOOP_TERMS,
     JOINT_STATES,
+    LQG_TERMS,
+    MPC_TERMS,
     PFC_TERMS,
     PFC_TIP_TERMS,
     PRESSURE_LIFTING,
@@ -67,7 +71,7 @@ class TrajectoryControl:
     """trajectory_node: the desired piston motion."""
 
     inputs: ClassVar[Topics] = (CYLINDER_STATES,)
-    outputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW)
+    outputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW, CYLINDER_MOVE)
     trajectory: AwayAndBack
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
@@ -75,9 +79,11 @@ class TrajectoryControl:
         inputs = TrajectoryInputs(signals["stroke"])
         state = state or self.trajectory.initial(inputs)
         ahead = self.trajectory.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
+        move = dict(zip(CYLINDER_MOVE.fields, self.trajectory.move(state, dt), strict=True))
         state, now = self.trajectory.step(state, inputs, dt)
         reference = {"reference_stroke": now.stroke, "reference_velocity": now.velocity}
-        return state, reference | dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
+        preview = dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
+        return state, reference | preview | move
 
 
 @dataclass(frozen=True)
@@ -171,6 +177,40 @@ class PfcTipControl:
     def _inputs(self, signals: Signals) -> TipInputs:
         measured = signals["angle"], signals["deflection"], signals["force"]
         return TipInputs(_reference(signals), _preview(signals), *measured)
+
+
+@dataclass(frozen=True)
+class LqgControl:
+    """lqg_node: LQG about a planned move, in the place of outer and force loop."""
+
+    inputs: ClassVar[Topics] = (
+        CYLINDER_REFERENCE, CYLINDER_MOVE, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING,
+        BOOM_DEFLECTION,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (LQG_TERMS, VALVE_COMMAND)
+    name: ClassVar[str] = "lqg"
+    lqg: Lqg
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        inputs = LqgInputs(
+            signals["reference_stroke"],
+            Move(*(signals[name] for name in CYLINDER_MOVE.fields)),
+            signals["angle"],
+            signals["pressure_lifting"],
+            signals["pressure_lowering"],
+            signals["deflection"],
+        )
+        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
+        return state, lqg_signals(self.name, outputs)
+
+
+@dataclass(frozen=True)
+class MpcControl(LqgControl):
+    """mpc_node: the same with a quadratic program in each period."""
+
+    outputs: ClassVar[Topics] = (MPC_TERMS, VALVE_COMMAND)
+    name: ClassVar[str] = "mpc"
 
 
 @dataclass(frozen=True)

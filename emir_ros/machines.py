@@ -44,6 +44,7 @@ class Machine(Protocol):
 
     command: Topic
     plant: Any
+    truth: Any
 
     def step(self, commands: Signals, dt: float) -> None:
         """Go on by dt, s, under the signals of the command topic."""

@@ -79,6 +79,11 @@ class PlantNode(Shell):
         """Return the simulated machine itself: Plant or RobotPlant."""
         return self.machine.plant
 
+    @property
+    def truth(self) -> Any:
+        """Return what no sensor blurs: Truth or RobotTruth."""
+        return self.machine.truth
+
     def _step(self, command: Signals) -> None:
         self.machine.step(command, PLANT_PERIOD_NS * 1e-9)
         self.tick += 1

@@ -54,16 +54,21 @@ setup(
         "design": ["control>=0.10"],
         # `emir view`: the page in the browser.
         "view": ["viser>=1.1"],
+        # The model predictive control (`--controller mpc`); the others do without.
+        "mpc": ["osqp>=1.0"],
         "test": [
             "control>=0.10",
             "distributed>=2024.8",
             "mujoco>=3.2",
+            "osqp>=1.0",
             "pandas>=2.2",
             "playwright>=1.40",
             "pytest>=8.2",
             "pytest-timeout>=2.3",
             "rosbags>=0.10",
         ],
+        # What `emir bench diagnosis` stands beside; these hold numpy back (an environment apart).
+        "identification": ["pysindy>=2.1", "sysidentpy>=0.9"],
         # What `emir bench` stands beside; what is missing, it says.
         "bench": ["do-mpc>=5.0", "mujoco>=3.2", "osqp>=1.0", "rosbags>=0.10"],
         # What ruff and mypy report changes with every minor release: raise them on purpose.

@@ -22,10 +22,12 @@ USAGE = """usage: emir COMMAND ...
   compare    every controller on the same moves: lag, deflection of the TCP, smoothness
   limit      the smallest deflection of the TCP that any command could reach for a move
   yardstick  controllers against that limit, over random draws of the machine
+  disturb    a push, a load dropped or picked up: what each controller makes of it
   design     a predictive controller for a machine, and where it is stable
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
+  urdf       the whole robot as URDF
   blind      machines with something hidden in them: does the diagnosis find it?
   bench      how fast machine, controllers and graph are, beside other programs
 
@@ -46,10 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "compare": _compare,
         "limit": _limit,
         "yardstick": _yardstick,
+        "disturb": _disturb,
         "design": _design,
         "linearize": _linearize,
         "figures": _figures,
         "diagnose": _diagnose,
+        "urdf": _urdf,
         "blind": _blind,
         "bench": _bench,
     }
@@ -247,16 +251,25 @@ def _yardstick(words: list[str]) -> int:
     return 0
 
 
+def _disturb(words: list[str]) -> int:
+    from emir_analysis.disturb_command import command
+
+    print(command(words, _progress))
+    return 0
+
+
 def _design(words: list[str]) -> int:
     from emir_analysis.design_command import command
 
     parser = argparse.ArgumentParser(prog="emir design")
     parser.add_argument(
-        "--from", dest="machine", metavar="MODEL", default="joint1",
-        help="YAML of the machine; default: EMIR's joint 1",
+        "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
+        help="YAML of the machine or recording of a run; default: EMIR's joint 1",
     )  # fmt: skip
     parser.add_argument("--controller", default="pfc", help="pfc (default) or pfc_tip")
-    parser.add_argument("--order", type=int, help="of the internal model; default 6, tip 8")
+    parser.add_argument(
+        "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
+    )
     parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
     parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
     parser.add_argument(
@@ -278,11 +291,16 @@ def _design(words: list[str]) -> int:
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
         return _hand_over("emir_ros.bench", words[1:])
+    if words[:1] == ["diagnosis"]:
+        from emir_analysis.bench import identification
+
+        identification.command(words[1:], print)
+        return 0
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
     from emir_analysis.bench.command import PARTS, command
 
     parser = argparse.ArgumentParser(prog="emir bench")
-    parser.add_argument("what", choices=(*PARTS, "graph"))
+    parser.add_argument("what", choices=(*PARTS, "graph", "diagnosis"))
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
     )
@@ -343,6 +361,13 @@ def _blind(words: list[str]) -> int:
     from emir_analysis.blind.command import arguments, command
 
     print(command(arguments(words), _progress))
+    return 0
+
+
+def _urdf(words: list[str]) -> int:
+    from emir_analysis.urdf_command import command, parser
+
+    print(command(parser().parse_args(words)))
     return 0
 
 

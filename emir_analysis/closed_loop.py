@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.disturbance import LoadChange, reloaded
 from emir_analysis.node_controls import force_loop_signals
 from emir_analysis.outer_loop import CascadeLoop, OuterLoop, Situation
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters, ForceLoopState
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    CYLINDER_MOVE,
     CYLINDER_PREVIEW,
     PLANT_PERIOD_NS,
     TRUTH,
@@ -30,12 +32,16 @@ PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """Machine, outer loop (paper 3.2 or 3.3) and force loop (paper 3.1)."""
+    """Machine, outer loop (paper 3.2 or 3.3) and force loop (paper 3.1).
+
+    change: of the payload in mid-run.
+    """
 
     plant: Plant
     trajectory: AwayAndBack
     outer: OuterLoop = field(default_factory=CascadeLoop)
     force_loop: ForceLoop = field(default_factory=lambda: ForceLoop(ForceLoopParameters()))
+    change: LoadChange | None = None
 
     def run(self, angle: float, pressure_lowering: float, duration: float) -> dict[str, Array]:
         """Run from rest at a boom angle, rad, and a lowering pressure, Pa, for a duration, s.
@@ -43,13 +49,18 @@ class ClosedLoop:
         Returns every signal of the topic table by name: those of the plant with one value each
         plant period, those of the controllers with one each control period, both ends included.
         """
-        state = self.plant.initial(angle, pressure_lowering)
-        truth = self.plant.outputs(state)
+        plant = self.plant
+        state = plant.initial(angle, pressure_lowering)
+        truth = plant.outputs(state)
+        changing = round(self.change.time / PLANT_PERIOD) if self.change else -1
         following = controlling = damping = None
         rows: dict[str, list[float]] = {}
         last = round(duration / PERIOD) * TICKS
         for tick in range(last + 1):
-            reading = measure(self.plant, truth, tick, state)
+            if self.change and tick == changing:
+                plant, state = reloaded(plant, state, self.change.payload)
+                truth = plant.outputs(state)
+            reading = measure(plant, truth, tick, state)
             _append(rows, reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True)))
             if tick % TICKS == 0:
                 here = TrajectoryInputs(reading.stroke)
@@ -68,11 +79,11 @@ class ClosedLoop:
                 if "velocity_command" in wanted:
                     damping, valve = self._force_loop(damping, wanted["velocity_command"], reading)
                     signals |= valve
-                signals |= wanted
+                signals |= wanted | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
                 ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
                 _append(rows, signals | ahead)
             if tick < last:
-                state, truth = self.plant.step(state, signals["valve_command"], PLANT_PERIOD)
+                state, truth = plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}
 
     def _force_loop(

@@ -14,17 +14,24 @@ from emir_analysis.design_pfc import (
     OperatingPoint,
     as_text,
     design_pfc,
+    designed,
     picture,
     scheduled,
     stability_map,
+    velocity_model,
 )
 from emir_analysis.errors import InputError
+from emir_analysis.identify import difference, from_recording
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
+from emir_control.pfc import PfcParameters
 from emir_plant.parameters import Machine, cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
+
+RECORDED_ORDER = 4  # an ordinary run tells no more than the integrator and the slow mode
+COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 
 def command(options: Namespace, progress: Callable[[str], None]) -> str:
@@ -32,19 +39,23 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
     if options.controller not in OUTPUTS:
         raise ParameterError(f"controller {options.controller!r}: there are {', '.join(OUTPUTS)}")
     output = OUTPUTS[options.controller]
+    recorded = _is_recording(Path(options.machine))
     task = DesignTask(
         controller=options.controller,
-        order=options.order or ORDERS[output],
+        order=options.order or (RECORDED_ORDER if recorded else ORDERS[output]),
         point=OperatingPoint(angle=math.radians(options.angle), payload=options.payload),
         observer=options.observer,
         tuning=_tuning(options),
     )
-    machine = _machine(options.machine)
+    machine = joint1() if recorded else _machine(options.machine)
     for line in cautions(with_values(machine, {"geometry.payload": options.payload})):
         progress(line)
-    progress("linearizing and reducing")
+    progress("identifying" if recorded else "linearizing and reducing")
+    found_model = ""
     try:
-        if options.schedule:
+        if recorded:
+            parameters, found_model = _identified(Path(options.machine), machine, task, options)
+        elif options.schedule:
             parameters = scheduled(machine, task, ANGLES, PAYLOADS)
         else:
             parameters = design_pfc(machine, task)
@@ -61,7 +72,29 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
     stable = "stable everywhere" if found.worst < 1.0 else "NOT stable everywhere (!)"
     return (
         f"{options.out}: {options.controller} of order {parameters.model.order}; {stable}\n"
+        f"{found_model}"
         f"largest |z| of the closed loop's poles (- : no such motion):\n{as_text(found)}"
+    )
+
+
+def _is_recording(path: Path) -> bool:
+    return path.is_dir() or path.suffix == ".mcap"
+
+
+def _identified(
+    bag: Path, machine: Machine, task: DesignTask, options: Namespace
+) -> tuple[PfcParameters, str]:
+    """Return a design by a recording's model, and how that compares with the machine's own."""
+    if options.schedule:
+        raise InputError("--schedule: one recording tells one model; a machine's YAML is needed")
+    output = OUTPUTS[task.controller]
+    identified = from_recording(bag, output, task.order)
+    linear = velocity_model(machine, task.point, output)
+    errors = difference(identified.model, linear, COMPARED)
+    told = ", ".join(f"{f:g} Hz {e:.0%}" for f, e in zip(COMPARED, errors, strict=True))
+    return designed(identified.model, task), (
+        f"explains {identified.fit:.0%} of the recorded motion; off the linearized machine at"
+        f" {math.degrees(task.point.angle):g} deg, {task.point.payload:g} kg: {told}\n"
     )
 
 
@@ -76,12 +109,13 @@ def _tuning(options: Namespace) -> dict[str, object]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _made_by(options: Namespace, task: DesignTask) -> dict[str, object]:
+def _made_by(options: Namespace, task: DesignTask) -> dict[str, str]:
     words = [f"--from {options.machine}", f"--controller {task.controller}"]
     words += [f"--order {task.order}", f"--angle {options.angle:g}"]
     words += ["--schedule"] if options.schedule else []
     words += [f"--payload {options.payload:g}", f"--observer {options.observer:g}"]
-    return {
-        "command": f"emir design {' '.join(words)}",
-        "linearized at": f"piston velocity {task.point.velocity:g} m/s, force loop closed",
-    }
+    made_by = {"command": f"emir design {' '.join(words)}"}
+    if not _is_recording(Path(options.machine)):
+        slow = f"piston velocity {task.point.velocity:g} m/s, force loop closed"
+        made_by["linearized at"] = slow
+    return made_by

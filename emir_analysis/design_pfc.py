@@ -105,7 +105,12 @@ def design_pfc(machine: Machine, task: DesignTask) -> PfcParameters:
     Raises SimulationError or ParameterError for a task that cannot be met.
     """
     output = OUTPUTS[task.controller]
-    model = design.reduced(velocity_model(machine, task.point, output), task.order)
+    return designed(design.reduced(velocity_model(machine, task.point, output), task.order), task)
+
+
+def designed(model: InternalModel, task: DesignTask) -> PfcParameters:
+    """Return the controller's parameters with an internal model of whatever origin."""
+    output = OUTPUTS[task.controller]
     if task.observer > 0.0:
         noise = design.Noise(task.observer, RESOLVER_STEP[output] / math.sqrt(12.0))
         model = design.with_observer(model, noise)
@@ -236,6 +241,9 @@ def picture(found: StabilityMap) -> Figure:
         axis.set_title("lifting" if velocity > 0.0 else "lowering")
         for (row, column), value in np.ndenumerate(table):
             if not math.isnan(value):
-                axis.text(column, row, f"{value:.4f}", ha="center", va="center", color="k")
+                axis.text(
+                    column, row, f"{value:.4f}", ha="center", va="center", color="k",
+                    fontsize=26.0 / len(found.angles) ** 0.7,
+                )  # fmt: skip
     figure.colorbar(image, ax=list(axes), label="spectral radius")
     return figure

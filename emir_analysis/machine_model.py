@@ -6,6 +6,7 @@ from dataclasses import replace
 from emir_common.parameter_tree import with_values
 from emir_control.actuator import ActuatorParameters
 from emir_control.boom import Boom, BoomTable
+from emir_control.lqg import LqgParameters
 from emir_control.prefilter import PrefilterParameters
 from emir_plant.parameters import Machine
 from emir_plant.record import record
@@ -25,6 +26,11 @@ def boom(machine: Machine) -> Boom:
         deflection=p["mode_deflection"],
         tip=p["mode_tip"],
     )
+
+
+def lqg_parameters(machine: Machine) -> LqgParameters:
+    """Return the parameters of an LQG control that knows the machine as stated."""
+    return LqgParameters(boom=boom_table(machine), actuator=actuator(machine))
 
 
 def boom_table(machine: Machine) -> BoomTable:

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 PUSH = 1e-3  # m/s, added to the command for a short while
 PUSHED, WATCHED = 10, 400  # control periods
 AT_REST = 1e-8  # m
+GROWN = 5e-3  # m, a dozen times what the push moves the piston
 WIDEST = 16.0  # factor within which, up and down, the margin is looked for
 HALVINGS = 8  # of the logarithm of that range: the margin is found to 1 %
 
@@ -98,7 +99,7 @@ def dies_out(linear: LinearMachine, outer: OuterLoop, factor: float) -> bool:
     reference, preview = Reference(at.stroke, 0.0), (at.stroke,) * PREVIEW
     for k in range(WATCHED):
         moved[k] = linear.model.C @ x
-        if abs(moved[k]) > 1.0:  # m
+        if abs(moved[k]) > GROWN:  # on its way to where the command's limits hold it
             return False
         now = Situation(reference, preview, linear.measured(x))
         signals: dict[str, Any]

@@ -6,10 +6,11 @@ The nodes of the graph and the replay of a recording both hold these objects.
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from emir_analysis.outer_loop import pfc_signals
+from emir_analysis.outer_loop import lqg_signals, pfc_signals
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
+from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc, PfcInputs
 from emir_control.prefilter import PrefilterParameters, joint_angle, piston_stroke
 from emir_control.scheduled_pfc import ScheduledPfc
@@ -17,6 +18,7 @@ from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import (
     AwayAndBack,
     Motion,
+    Move,
     Reference,
     TrajectoryInputs,
     TrajectoryState,
@@ -25,11 +27,14 @@ from emir_control.waypoints import Along, Axis, Coordinate, Followed, Waypoints,
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CASCADE_TERMS,
+    CYLINDER_MOVE,
     CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
     FORCE_LOOP_TERMS,
     JOINT_STATES,
+    LQG_TERMS,
+    MPC_TERMS,
     PFC_TERMS,
     PFC_TIP_TERMS,
     PRESSURE_LIFTING,
@@ -122,7 +127,7 @@ class TrajectoryControl:
     """trajectory_node: the desired piston motion."""
 
     inputs: ClassVar[Topics] = (CYLINDER_STATES,)
-    outputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW)
+    outputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_PREVIEW, CYLINDER_MOVE)
     trajectory: AwayAndBack
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
@@ -131,9 +136,11 @@ class TrajectoryControl:
         state = state or self.trajectory.initial(inputs)
         motion = self._motion(state)
         ahead = motion.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
+        move = dict(zip(CYLINDER_MOVE.fields, motion.move(state, dt), strict=True))
         state, now = motion.step(state, inputs, dt)
         reference = {"reference_stroke": now.stroke, "reference_velocity": now.velocity}
-        return state, reference | dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
+        preview = dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
+        return state, reference | preview | move
 
     def held(self, state: TrajectoryState, dt: float) -> TrajectoryState:
         """Return the state in which the reference comes to rest and stays there."""
@@ -242,6 +249,40 @@ class PfcTipControl:
     def _inputs(self, signals: Signals) -> TipInputs:
         measured = signals["angle"], signals["deflection"], signals["force"]
         return TipInputs(_reference(signals), _preview(signals), *measured)
+
+
+@dataclass(frozen=True)
+class LqgControl:
+    """lqg_node: LQG about a planned move, in the place of outer and force loop."""
+
+    inputs: ClassVar[Topics] = (
+        CYLINDER_REFERENCE, CYLINDER_MOVE, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING,
+        BOOM_DEFLECTION,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (LQG_TERMS, VALVE_COMMAND)
+    name: ClassVar[str] = "lqg"
+    lqg: Lqg
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        inputs = LqgInputs(
+            signals["reference_stroke"],
+            Move(*(signals[name] for name in CYLINDER_MOVE.fields)),
+            signals["angle"],
+            signals["pressure_lifting"],
+            signals["pressure_lowering"],
+            signals["deflection"],
+        )
+        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
+        return state, lqg_signals(self.name, outputs)
+
+
+@dataclass(frozen=True)
+class MpcControl(LqgControl):
+    """mpc_node: the same with a quadratic program in each period."""
+
+    outputs: ClassVar[Topics] = (MPC_TERMS, VALVE_COMMAND)
+    name: ClassVar[str] = "mpc"
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.scheduled_pfc import ScheduledPfc
+from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import NO_MOVE, Move, Reference
 from emir_plant.sensors import Measurement
@@ -74,10 +75,24 @@ class PfcTipLoop:
 
 
 @dataclass(frozen=True)
+class ShapedLoop:
+    """Conventional control of a shaped reference."""
+
+    shaped: ShapedCascade
+
+    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+        """Return the next state and the signals; state None: begin here."""
+        inputs = ShapedInputs(now.reference, now.move, now.reading.stroke, now.reading.force)
+        state, outputs = self.shaped.step(state or self.shaped.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
+
+
+@dataclass(frozen=True)
 class LqgLoop:
-    """LQG about a planned motion; gives the valve command itself."""
+    """LQG, or by its name MPC, about a planned motion; gives the valve command itself."""
 
     lqg: Lqg
+    name: str = "lqg"
 
     def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
@@ -91,14 +106,14 @@ class LqgLoop:
             r.deflection,
         )
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, lqg_signals(outputs)
+        return state, lqg_signals(self.name, outputs)
 
 
-def lqg_signals(outputs: LqgOutputs) -> Signals:
+def lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
     """Return command and terms by the names of the topic table."""
     terms = outputs._asdict()
     command = terms.pop("valve_command")
-    return {"valve_command": command} | {f"lqg_{name}": value for name, value in terms.items()}
+    return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
 
 
 def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:

@@ -11,9 +11,12 @@ from typing import Any
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
+from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
     ForceLoopControl,
+    LqgControl,
+    MpcControl,
     NodeControl,
     PfcControl,
     PfcTipControl,
@@ -21,6 +24,7 @@ from emir_analysis.node_controls import (
     TrajectoryControl,
 )
 from emir_analysis.replay_plant import replay_plant
+from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_analysis.switching import Ready
@@ -29,21 +33,25 @@ from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
+from emir_control.lqg import Lqg
+from emir_control.mpc import Mpc
 from emir_control.pfc import PfcParameters
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
     SELECTOR_TERMS,
     VELOCITY_COMMAND,
 )
+from emir_plant.sheet import joint1
 
 Values = dict[str, Any]
 
 PLANT = "plant"
-NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop", PLANT)
+NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "force_loop", PLANT)
 # parameters of nodes, not controllers
 OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
 
@@ -57,9 +65,11 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
+    about = bags.metadata(bag).get("emir", {})
+    if full_name(TCP_POSE, bags.recorded_topics(bag)):
+        return replay_robot(bag, node, {**_recorded_parameters(bag, node, about), **changed})
     if node == PLANT:
         return replay_plant(bag, changed)
-    about = bags.metadata(bag).get("emir", {})
     control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
     law: Stepping = control
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
@@ -113,18 +123,44 @@ def _recorded_parameters(bag: Path, node: str, about: Mapping[str, str]) -> Valu
 
 def _control(node: str, values: Values) -> NodeControl:
     try:
-        if node == "cascade":
-            return CascadeControl(Cascade(with_values(CascadeParameters(), values)))
-        if node == "force_loop":
-            return ForceLoopControl(ForceLoop(with_values(ForceLoopParameters(), values)))
-        if node == "pfc":
-            return PfcControl(law_of(_design(pfc_file.STROKE, values)))
-        if node == "pfc_tip":
-            return PfcTipControl(Tip(law_of(_design(pfc_file.TIP_ANGLE, values))))
-        name = values.pop("trajectory", "lift-lower")
-        return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
+        return _CONTROLS[node](values)
     except ParameterError as error:
         raise ParameterError(f"{node}: {error}") from None
+
+
+def _cascade(values: Values) -> NodeControl:
+    return CascadeControl(Cascade(with_values(CascadeParameters(), values)))
+
+
+def _force_loop(values: Values) -> NodeControl:
+    return ForceLoopControl(ForceLoop(with_values(ForceLoopParameters(), values)))
+
+
+def _pfc(values: Values) -> NodeControl:
+    return PfcControl(law_of(_design(pfc_file.STROKE, values)))
+
+
+def _pfc_tip(values: Values) -> NodeControl:
+    return PfcTipControl(Tip(law_of(_design(pfc_file.TIP_ANGLE, values))))
+
+
+def _lqg(values: Values) -> NodeControl:
+    return LqgControl(Lqg(with_values(lqg_parameters(joint1()), values)))
+
+
+def _mpc(values: Values) -> NodeControl:
+    return MpcControl(Mpc(with_values(lqg_parameters(joint1()), values)))
+
+
+def _trajectory(values: Values) -> NodeControl:
+    name = values.pop("trajectory", "lift-lower")
+    return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
+
+
+_CONTROLS = {
+    "trajectory": _trajectory, "cascade": _cascade, "pfc": _pfc, "pfc_tip": _pfc_tip,
+    "lqg": _lqg, "mpc": _mpc, "force_loop": _force_loop,
+}  # fmt: skip
 
 
 def _design(output: str, values: Values) -> PfcParameters:

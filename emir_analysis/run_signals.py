@@ -12,6 +12,7 @@ from emir_msgs_py.robot_topics import (
     PRESSURES,
     ROBOT_CYLINDER_REFERENCE,
     ROBOT_CYLINDER_STATES,
+    ROBOT_JOINT_STATES,
     ROBOT_TRUTH,
     ROBOT_VALVE_COMMAND,
     TCP_DEFLECTION,
@@ -36,6 +37,7 @@ ROBOT_NEEDED = (
     ROBOT_CYLINDER_STATES, ROBOT_CYLINDER_REFERENCE, ROBOT_VALVE_COMMAND, PRESSURES, TCP_POSE,
     TCP_DEFLECTION, TCP_REFERENCE,
 )  # fmt: skip
+ROBOT_OPTIONAL = (ROBOT_JOINT_STATES, ROBOT_TRUTH)
 
 Array = NDArray[np.float64]
 
@@ -48,7 +50,7 @@ def load_run(path: Path) -> Recording:
     there = bags.recorded_topics(path)
     sources: dict[str, Source] = {}
     robot = full_name(TCP_POSE, there) is not None
-    needed, optional = (ROBOT_NEEDED, (ROBOT_TRUTH,)) if robot else (NEEDED, OPTIONAL)
+    needed, optional = (ROBOT_NEEDED, ROBOT_OPTIONAL) if robot else (NEEDED, OPTIONAL)
     for topic in (*needed, *optional):
         name = full_name(topic, there)
         if name is not None:

@@ -3,12 +3,15 @@
 R is the largest dynamic deflection of the TCP in a run, divided by the smallest that any command
 could reach for the same stroke, time, payload and posture (`limit.py`). The dynamic deflection is
 the TCP's off the line of the first section, less what it is at rest in the posture of that
-instant, in proportion to cos(alpha).
+instant, in proportion to cos(alpha). The stroke is what is left of it when the move starts: a
+controller that begins before gains nothing by that.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +20,23 @@ from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
 from emir_analysis.compare import REST_PRESSURE, Run, dynamic_deflection
 from emir_analysis.limit import PAPER_MOVE, Move, least
 from emir_analysis.machine_model import actuator, boom_table
-from emir_analysis.outer_loop import CascadeLoop, LqgLoop, OuterLoop, PfcLoop, PfcTipLoop
+from emir_analysis.outer_loop import (
+    CascadeLoop,
+    LqgLoop,
+    OuterLoop,
+    PfcLoop,
+    PfcTipLoop,
+    ShapedLoop,
+)
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
+from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.lqg import Lqg, LqgParameters
+from emir_control.mpc import Mpc
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.regulator import RegulatorParameters
+from emir_control.shaping import ShapedCascade, ShapedParameters, Shaper
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
 from emir_plant import linkage
@@ -46,7 +59,7 @@ class Range:
 
     angle: rad. payload: kg. stiffness, edges: factors on beta and on each return edge's k.
     friction: N. hysteresis: width of the spool's play. delay: s. supply, threshold: Pa.
-    directions: 1 lifts, -1 lowers.
+    directions: 1 lifts, -1 lowers. wait: s, at rest before the move.
     """
 
     angle: tuple[float, float] = (math.radians(30.0), math.radians(75.0))
@@ -68,6 +81,7 @@ HARD = Range(
     payload=(0.0, 0.0),
     threshold=80e5,
     directions=(-1,),
+    wait=8.0,
 )
 
 
@@ -117,10 +131,20 @@ def controllers(machine: Machine, among: Range = EVERYDAY) -> dict[str, OuterLoo
         regulator=RegulatorParameters(delay=among.delay),
         hysteresis=among.hysteresis,
     )
+    conventional = Cascade(CascadeParameters())
+    shapers = {
+        name: ShapedLoop(
+            ShapedCascade(ShapedParameters(boom=lqg.boom, cascade=conventional, shaper=name))
+        )
+        for name in get_args(Shaper)
+    }
+    others = {"mpc": LqgLoop(Mpc(lqg), "mpc")} if find_spec("osqp") else {}
     return {
         "cascade": CascadeLoop(),
+        **shapers,
         "pfc": PfcLoop(Pfc(joint)),
         "pfc_tip": PfcTipLoop(Tip(Pfc(tip))),
+        **others,
         "lqg": LqgLoop(Lqg(lqg)),
     }
 
@@ -172,12 +196,15 @@ def score(draw: Draw, outer: OuterLoop, limit: float, among: Range = EVERYDAY) -
     except SimulationError:
         return FAILURE
     bending = dynamic_deflection(signals)
+    stroke = signals["true_stroke"]
+    start = round(among.wait / PLANT_PERIOD)
+    left = 1.0 - float(stroke[start] - stroke[0]) / draw.stroke
     after = round((among.wait + PAPER_MOVE.duration + SETTLING) / PLANT_PERIOD)
     return Score(
-        ratio=float(abs(bending).max() / limit),
+        ratio=float(abs(bending).max() / (limit * left)),
         settled=float(abs(bending[after:]).max()),
         position=float(abs(tcp_error(draw.machine, signals)[after // TICKS :]).max()),
-        taken=_taken(signals["true_stroke"], draw.stroke),
+        taken=_taken(stroke, draw.stroke),
     )
 
 

@@ -85,6 +85,10 @@ class Actuator:
         beta = self.softness * self.parameters.beta
         return beta * (lifting * s.area_lifting + lowering * s.area_lowering)
 
+    def compression(self, stroke: float) -> float:
+        """Return by how far the piston goes down on a shut lifting chamber, m/Pa."""
+        return 1.0 / (self.softness * self.parameters.beta * self._shares(stroke)[0])
+
     def force(self, lifting: float, lowering: float) -> float:
         """Return F, N, of the chambers' pressures, Pa."""
         s = self.parameters.static

@@ -21,7 +21,7 @@ from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
 from emir_control.motion_plan import MotionPlan, Target, planned, resting
-from emir_control.prefilter import joint_angle, piston_velocity
+from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
 from emir_control.regulator import Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
 
@@ -29,6 +29,33 @@ Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
+
+
+@dataclass(frozen=True, kw_only=True)
+class FillParameters:
+    """How the lowering chamber is filled before lowering where the logic block is shut.
+
+    The pump pushes the piston down on the shut lifting chamber until its pressure opens the
+    block, the slower the nearer: speed = rate * way left, risen to with an acceleration.
+    """
+
+    lead: float = quantity("s", 0.0, 30.0, "before the move; 0: no filling", default=7.0)
+    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=3e5)
+    rate: float = quantity("1/s", 0.01, 10.0, "speed over way left", default=0.8)
+    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=6e-4)
+    acceleration: float = quantity("m/s^2", 1e-4, 1.0, "of the piston", default=2.5e-3)
+    damping: float = quantity("1/s", 0.0, 20.0, "speed by the force's deviation / k_h", default=3.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+    def velocity(
+        self, filled: "Filled", missing: float, drive: Actuator, stroke: float, dt: float
+    ) -> float:
+        """Return the speed, m/s, with a pressure, Pa, missing to the aim."""
+        left = missing * drive.compression(stroke)
+        wanted = max(self.rate * left, self.slowest)
+        return min(wanted, filled.velocity + self.acceleration * dt)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +70,7 @@ class LqgParameters:
     actuator: ActuatorParameters = field(default_factory=ActuatorParameters)
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
     softness: float = quantity(
-        "1", 0.1, 2.0, "of the stated k_h: oil softer than stated does more harm", default=0.94
+        "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
     )
     allowance: float = quantity(
         "1", 0.0, 1.0, "of the plan's deflection over the smallest, for smoothness", default=0.055
@@ -56,6 +83,8 @@ class LqgParameters:
     rest_standstill: float = quantity("m/s", 0.0, 0.01, "the same at rest", default=3e-3)
     rest_deflection: float = quantity("m", 0.0, 1.0, "left alone at rest", default=2.5e-3)
     rest_position: float = quantity("m", 0.0, 1.0, "of the TCP left alone at rest", default=2e-2)
+    lead: float = quantity("s", 0.1, 10.0, "before the move, when it is planned", default=0.6)
+    fill: FillParameters = field(default_factory=FillParameters)
     reading_time: float = quantity(
         "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=2.0
     )
@@ -65,19 +94,31 @@ class LqgParameters:
 
 
 class Rest(NamedTuple):
-    """Means at rest, since it began: control periods, F, N, and bending, rad."""
+    """Means at rest, since it began: control periods, F, N, bending and joint angle, rad."""
 
     periods: int
     force: float
     bending: float
+    angle: float
+
+
+class Filled(NamedTuple):
+    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s."""
+
+    moved: float
+    velocity: float
+
+
+NOT_FILLED = Filled(0.0, 0.0)
 
 
 class LqgState(NamedTuple):
     """Where the control stands.
 
-    start: stroke from which the next plan starts, m. offset: of the measured bending, rad, in
+    offset: of the measured bending, rad, in
     gravity of cos(alpha) = 1. estimate: (n,) x. past: u off the plan, m/s, the newest first.
-    logic: block's opening. command: the last one. moving: a move is under way.
+    logic: block's opening. command: the last one. moving: a move is under way or about to begin.
+    filled: what a filling of the lowering chamber has told.
     """
 
     plan: MotionPlan
@@ -90,6 +131,7 @@ class LqgState(NamedTuple):
     logic: float
     command: float
     moving: bool
+    filled: Filled
 
 
 class LqgInputs(NamedTuple):
@@ -115,6 +157,14 @@ class LqgOutputs(NamedTuple):
     deflection: float  # dynamic, of the TCP, as estimated, m
 
 
+class Now(NamedTuple):
+    """When a command acts, s since the plan's start, for how long, s, and on what oil."""
+
+    time: float
+    dt: float
+    oil: Oil
+
+
 @dataclass(frozen=True)
 class Lqg:
     """The control law; the planning takes some tenths of a second, a step some ten us."""
@@ -130,9 +180,10 @@ class Lqg:
     def initial(self, inputs: LqgInputs) -> LqgState:
         """Return the state of a machine that rests with what is measured now."""
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
-        rest = Rest(1, force, inputs.deflection)
+        rest = Rest(1, force, inputs.deflection, inputs.angle)
         piloted = inputs.pressure_lifting > self.parameters.actuator.threshold
-        return self._begin(rest, inputs._replace(move=NO_MOVE), float(piloted), 0.0)
+        start = inputs._replace(move=NO_MOVE)
+        return self._begin(rest, start, float(piloted), 0.0, NOT_FILLED)
 
     def step(self, state: LqgState, inputs: LqgInputs, dt: float) -> tuple[LqgState, LqgOutputs]:
         """Return the valve command of this control period of dt, s.
@@ -143,15 +194,19 @@ class Lqg:
             nan = math.nan
             return state._replace(command=0.0), LqgOutputs(0.0, nan, nan, nan, nan, nan, nan)
         state = self._prepared(state, inputs)
+        if self._to_fill(state, inputs):
+            return self._filling(state, inputs, dt)
+        if (state.moving or state.filled.moved) and inputs.move.since < self._begins:
+            return self._waiting(state, inputs)
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
         estimate = self._corrected(state, inputs, target)
         from_plan = plan.velocity(time + self._late, dt)
-        wanted = from_plan + self._feedback(state, estimate)
-        shut = self._resting(law, estimate, wanted, arrived=time >= plan.duration)
         logic = max(state.logic, LEAST_OPEN)
         oil = Oil(target.stroke, inputs.pressure_lifting, inputs.pressure_lowering, logic)
+        wanted = from_plan + self._feedback(state, estimate, Now(time + self._late, dt, oil))
+        shut = self._resting(law, estimate, wanted, arrived=time >= plan.duration)
         opening = 0.0 if shut else self.drive.opening(wanted, oil)
         given = self.drive.velocity(opening, oil) - from_plan
         after = self._moved(state, estimate, given, opening, inputs)
@@ -167,43 +222,96 @@ class Lqg:
         return after, outputs
 
     @property
+    def _begins(self) -> float:
+        """When the plan's first command has to be given, s since the move's start."""
+        return -self._late - self.parameters.period
+
+    @property
     def _late(self) -> float:
         """From measurement to spool, s."""
         return self.parameters.regulator.delay + self.drive.lag
 
+    def _waiting(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, LqgOutputs]:
+        """Return the shut valve of a move that is planned and has not begun."""
+        logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
+        outputs = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
+        filled = state.filled._replace(velocity=0.0)
+        return state._replace(command=0.0, logic=logic, filled=filled), outputs
+
+    def _to_fill(self, state: LqgState, inputs: LqgInputs) -> bool:
+        """Tell whether the lowering chamber has to be filled before the move that comes."""
+        move, fill = inputs.move, self.parameters.fill
+        if state.moving or move.distance >= 0.0 or not -fill.lead <= move.since < 0.0:
+            return False
+        if state.filled.moved and not state.filled.velocity:
+            return False  # it has been full already
+        return inputs.pressure_lifting < self.parameters.actuator.threshold + fill.margin
+
+    def _filling(
+        self, state: LqgState, inputs: LqgInputs, dt: float
+    ) -> tuple[LqgState, LqgOutputs]:
+        """Return a small opening that lets the pump fill the lowering chamber."""
+        p, drive = self.parameters.actuator, self.drive
+        stroke = inputs.reference + state.filled.moved
+        oil = Oil(stroke, inputs.pressure_lifting, inputs.pressure_lowering, 0.0)
+        missing = p.threshold + self.parameters.fill.margin - inputs.pressure_lifting
+        velocity = self.parameters.fill.velocity(state.filled, missing, drive, stroke, dt)
+        force = drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        pushed = (force - state.rest.force) / drive.stiffness(stroke)
+        given = max(velocity + self.parameters.fill.damping * pushed, 0.0)
+        opening = drive.opening(-given, oil)
+        command = drive.command(opening) - (0.5 * self.parameters.hysteresis if given else 0.0)
+        logic = drive.next_logic(state.logic, inputs.pressure_lifting, dt)
+        moved = state.filled.moved - given * dt
+        filled = Filled(moved, velocity)
+        outputs = LqgOutputs(command, -velocity, -given, 0.0, 0.0, state.payload, 0.0)
+        rest = state.rest._replace(periods=0)
+        after = state._replace(command=command, logic=logic, filled=filled, rest=rest)
+        return after, outputs
+
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
-        if inputs.move.since >= -self._late - self.parameters.period:
+        if inputs.move.distance and inputs.move.since >= -self.parameters.lead:
             if state.moving:
                 return state
-            return self._begin(state.rest, inputs, state.logic, state.command)
+            return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
         count = 1 if state.moving else state.rest.periods + 1
         weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
-        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
-        rest = Rest(
-            count,
-            state.rest.force + weight * (force - state.rest.force),
-            state.rest.bending + weight * (inputs.deflection - state.rest.bending),
-        )
-        return state._replace(rest=rest, moving=False)
+        last = state.rest
+        rest = last._replace(periods=count, angle=last.angle + weight * (inputs.angle - last.angle))
+        if not state.filled.moved or state.moving:  # what was read before still holds
+            force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+            rest = rest._replace(
+                force=last.force + weight * (force - last.force),
+                bending=last.bending + weight * (inputs.deflection - last.bending),
+            )
+        filled = NOT_FILLED if state.moving else state.filled
+        return state._replace(rest=rest, moving=False, filled=filled)
 
-    def _begin(self, rest: Rest, inputs: LqgInputs, logic: float, command: float) -> LqgState:
+    def _begin(
+        self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
+    ) -> LqgState:
         """Return the state at the start of a move, or of a rest, with what was read at rest."""
         p, drive, move = self.parameters, self.drive, inputs.move
         linkage = p.actuator.static
+        start = inputs.reference
+        if move.distance and filled.moved:
+            start = piston_stroke(rest.angle, linkage)
+            move = move._replace(distance=move.distance + inputs.reference - start)
         angle = joint_angle(inputs.reference, linkage)
         torque = rest.force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
         payload = p.boom.payload(torque)
         boom = p.boom.loaded(payload)
-        plan = self._plan(boom, inputs.reference, move)
-        law = regulator(boom, drive, inputs.reference + 0.5 * move.distance, p.period, p.regulator)
+        plan = self._plan(boom, start, move)
+        law = regulator(boom, drive, start + 0.5 * move.distance, p.period, p.regulator)
         estimate = np.zeros(len(law.A))
         if move.distance:
             estimate[law.force] = math.copysign(p.friction / plan.stiffness, move.distance)
-        offset = (rest.bending - float(plan.bending[0])) / math.cos(angle)
+        hanging = float(plan.bending[0]) / math.cos(float(plan.angle[0]))
+        offset = rest.bending / math.cos(angle) - hanging
         past = (0.0,) * law.delays
-        moving = move.distance != 0.0
-        return LqgState(plan, law, payload, offset, rest, estimate, past, logic, command, moving)
+        memory = past, logic, command, move.distance != 0.0, filled
+        return LqgState(plan, law, payload, offset, rest, estimate, *memory)
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
@@ -223,13 +331,17 @@ class Lqg:
         ])  # fmt: skip
         return state.estimate + law.kalman @ (measured - law.C @ state.estimate)
 
-    def _feedback(self, state: LqgState, estimate: Array) -> float:
+    def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""
         law = state.regulator
-        flow = float(estimate[law.flow])
-        off = np.append(estimate[: law.controlled], np.array(state.past) + flow)
+        return -float(estimate[law.flow]) - float(law.feedback @ self._off(state, estimate))
+
+    def _off(self, state: LqgState, estimate: Array) -> Array:
+        """Return what the feedback acts on: (q, q', s - f, past u + d)."""
+        law = state.regulator
+        off = np.append(estimate[: law.controlled], np.array(state.past) + estimate[law.flow])
         off[law.controlled - 1] -= estimate[law.force]
-        return -flow - float(law.feedback @ off)
+        return off
 
     def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
         """Tell whether the valve stays shut."""

@@ -34,6 +34,7 @@ class MotionPlan:
     """Samples in steps of STEP from the move's start; before and after it everything rests.
 
     stiffness: k_h in the move's middle, N/m. angle, stroke, bending, force: (n,), as in Target.
+    deflection: (n,) dynamic, of the TCP, m.
     """
 
     stiffness: float
@@ -41,6 +42,7 @@ class MotionPlan:
     stroke: Array
     bending: Array
     force: Array
+    deflection: Array
 
     @property
     def duration(self) -> float:
@@ -58,6 +60,11 @@ class MotionPlan:
 
         columns = (self.angle, self.stroke, self.bending, self.force)
         return Target(*map(value, columns))
+
+    def bend(self, time: float) -> float:
+        """Return the TCP's dynamic deflection, m, time s after the start; 0 once it is over."""
+        steps = STEP * np.arange(len(self.deflection))
+        return float(np.interp(time, steps, self.deflection, right=0.0))
 
     def velocity(self, time: float, dt: float) -> float:
         """Return the mean u, m/s, over dt, s, from a time, s, on."""
@@ -111,6 +118,7 @@ def _follow(
         stroke=stroke,
         bending=shape @ (boom.tip_angle - boom.joint),
         force=torque / np.array([piston_velocity(1.0, a, linkage) for a in angle]),
+        deflection=motion.deflection,
     )
 
 

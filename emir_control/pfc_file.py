@@ -1,6 +1,7 @@
 """A predictive controller's design as a YAML file: what made it, tuning, internal model."""
 
 import dataclasses
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -45,13 +46,13 @@ def load(file: Path, output: str) -> PfcParameters:
         raise ParameterError(f"{file}: {error}") from None
 
 
-def save(file: Path, parameters: PfcParameters, output: str, made_by: dict[str, Any]) -> None:
+def save(file: Path, parameters: PfcParameters, output: str, made_by: Mapping[str, Any]) -> None:
     """Write a design. made_by: what a reader needs to make it again. Raises ParameterError."""
     model = {"output": output, "period": parameters.model.period} | _arrays(parameters.model)
     tuning = {f.name: getattr(parameters, f.name) for f in dataclasses.fields(parameters)}
     del tuning["model"], tuning["schedule"]
     tuning["coincidence"] = list(parameters.coincidence)
-    content = {"made_by": made_by, "tuning": tuning, "model": model}
+    content = {"made_by": dict(made_by), "tuning": tuning, "model": model}
     if parameters.schedule is not None:
         content["schedule"] = _written(parameters.schedule)
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=100)

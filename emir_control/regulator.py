@@ -58,8 +58,8 @@ class Regulator:
 
     modes: m in q. A: (n, n), n = 2 m + 3. B: (n, l + 1), for u now and l past ones. C: (3, n):
     joint angle, rad, bending, rad, s, m. kalman: (n, 3). feedback: (2 m + 1 + l,), on (q, q', s)
-    and the past u. cost: its matrix of the cost to go. deflection, position: (m,) of the TCP, m.
-    velocity_weight: m/s.
+    and the past u: w = (q, q', s, past u), w(k+1) = extended w + driven u. stage, cost: matrices of
+    the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
     """
 
     modes: int
@@ -68,8 +68,10 @@ class Regulator:
     C: Array
     kalman: Array
     feedback: Array
-    cost: Array
+    extended: Array
+    driven: Array
     stage: Array
+    cost: Array
     deflection: Array
     position: Array
 
@@ -118,8 +120,10 @@ def regulator(
         C=C,
         kalman=_kalman(A, B, C, stiffness, p),
         feedback=feedback,
-        cost=cost,
+        extended=extended,
+        driven=driven[:, 0],
         stage=stage,
+        cost=cost,
         deflection=boom.deflection[:m],
         position=boom.tip[:m],
     )

@@ -25,6 +25,7 @@ class Move(NamedTuple):
     distance: float  # m
 
 
+LONG = 1e6  # s
 NO_MOVE = Move(-math.inf, 0.0, 0.0)
 
 
@@ -141,6 +142,10 @@ class Motion:
         """Return the strokes, m, of the `count` periods that follow the next step's own."""
         times = ((state.ticks + k) * dt for k in range(1, count + 1))
         return tuple(self.at(time, state.start).stroke for time in times)
+
+    def move(self, state: TrajectoryState, dt: float) -> Move:
+        """Return the move under way or to come; here there is none, and long no other."""
+        return Move(-LONG, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,22 @@ PFC_MEANINGS = {
 MEANINGS |= {
     f"{name}_{term}": text for name in ("pfc", "pfc_tip") for term, text in PFC_MEANINGS.items()
 }
+LQG_MEANINGS = {
+    "planned": "velocity that both flows together shall give, as planned",
+    "wanted": "the same with the feedback",
+    "flow": "unknown flow, as the velocity that it gives, estimated",
+    "force": "unknown force on the piston, friction for one, estimated",
+    "payload": "payload at the TCP, read from the piston force at rest",
+    "deflection": "the TCP's dynamic deflection off the plan, estimated",
+}
+MEANINGS |= {
+    f"{name}_{term}": text for name in ("lqg", "mpc") for term, text in LQG_MEANINGS.items()
+}
+MEANINGS |= {
+    "move_since": "time since the start of the move under way, negative before the next one",
+    "move_duration": "how long that move takes",
+    "move_distance": "by how much it moves the piston, lifting positive",
+}
 MEANINGS |= {f"{name}_command": f"piston velocity that {name} asks for" for name in OUTER_LOOPS}
 MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in OUTER_LOOPS}
 MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"

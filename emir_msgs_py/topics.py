@@ -145,6 +145,13 @@ CYLINDER_PREVIEW = named_numbers(  # paper 3.3: N = 20 control periods
     {f"reference_stroke_{k}_ahead": "m" for k in range(1, 21)},
     "command",
 )
+CYLINDER_MOVE = named_numbers(
+    "cylinder_move",
+    "trajectory_node",
+    "control",
+    {"move_since": "s", "move_duration": "s", "move_distance": "m"},
+    "command",
+)
 VELOCITY_COMMAND = Topic(
     "velocity_command",
     JOINT_STATE,
@@ -182,6 +189,7 @@ VALVE_COMMAND = Topic(
     {"valve_command": Field("position[0]", "1")},
     ("valve1",),
     "cylinder1",
+    ("lqg_node", "mpc_node"),
 )
 CASCADE_TERMS = named_numbers(
     "cascade/terms",
@@ -200,6 +208,15 @@ def _pfc_terms(name: str, output_unit: str) -> Topic:
     return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
 
 
+def _lqg_terms(name: str) -> Topic:
+    terms = dict.fromkeys(("planned", "wanted", "flow"), "m/s")
+    terms |= {"force": "N", "payload": "kg", "deflection": "m"}
+    units = {f"{name}_{term}": unit for term, unit in terms.items()}
+    return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
+
+
+LQG_TERMS = _lqg_terms("lqg")
+MPC_TERMS = _lqg_terms("mpc")
 PFC_TERMS = _pfc_terms("pfc", "m")
 PFC_TIP_TERMS = _pfc_terms("pfc_tip", "rad")
 FORCE_LOOP_TERMS = named_numbers(
@@ -211,8 +228,8 @@ FORCE_LOOP_TERMS = named_numbers(
 
 TOPICS: tuple[Topic, ...] = (
     JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING, BOOM_DEFLECTION, TRUTH,
-    CYLINDER_REFERENCE, CYLINDER_PREVIEW, VELOCITY_COMMAND, VALVE_COMMAND,
-    CASCADE_TERMS, PFC_TERMS, PFC_TIP_TERMS, FORCE_LOOP_TERMS,
+    CYLINDER_REFERENCE, CYLINDER_PREVIEW, CYLINDER_MOVE, VELOCITY_COMMAND, VALVE_COMMAND,
+    CASCADE_TERMS, PFC_TERMS, PFC_TIP_TERMS, LQG_TERMS, MPC_TERMS, FORCE_LOOP_TERMS,
     *OFFERED_COMMANDS.values(), SELECTOR_TERMS,
 )  # fmt: skip
 

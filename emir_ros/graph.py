@@ -1,6 +1,7 @@
 """The nodes of a run and the ROS arguments that set them up."""
 
 import json
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,10 +24,12 @@ from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-CONTROLLERS = {
+VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
+CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
+CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_CONTROLLERS}
 NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
@@ -44,7 +47,8 @@ class Plan:
 
     controller: a key of CONTROLLERS. switches: to which others, and when; these run from the
     start as well, and hold their state ready. duration: s; None: as long as the trajectory takes.
-    params: ROS 2 parameter file, or None. model: a key of MODELS.
+    params: ROS 2 parameter file, or None. model: a key of MODELS. namespace: of all nodes and
+    topics, so that several machines have their place in one ROS domain.
     """
 
     bag: Path
@@ -55,6 +59,7 @@ class Plan:
     lockstep: bool = True
     model: str = JOINT1
     switches: tuple[Switch, ...] = ()
+    namespace: str = ""
 
     @property
     def controllers(self) -> tuple[str, ...]:
@@ -82,7 +87,15 @@ class Plan:
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
     _check_model(plan)
-    Selector(plan.controllers, _from_the_start(plan))
+    for name in plan.controllers:
+        if name in VALVE_CONTROLLERS and plan.switches:
+            raise ParameterError(f"controller {name!r}: cannot be switched to or from")
+    if plan.controller not in VALVE_CONTROLLERS:
+        Selector(plan.controllers, _from_the_start(plan))
+    if not re.fullmatch(r"([A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", plan.namespace, re.ASCII):
+        raise ParameterError(
+            f"namespace {plan.namespace!r}: letters, digits and _, not a digit first"
+        )
     if plan.bag.exists():
         raise ParameterError(f"{plan.bag}: exists already, and is not overwritten")
     if plan.duration is not None and not 0.0 < plan.duration < float("inf"):
@@ -177,8 +190,19 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
     with tempfile.TemporaryDirectory(prefix="emir-") as folder:
         own = Path(folder) / "run.yaml"
         own.write_text(yaml.safe_dump(_run_parameters(plan)), encoding="utf-8")
-        files = [plan.params, own] if plan.params else [own]  # the later file prevails
-        yield ["--ros-args", *(word for file in files for word in ("--params-file", str(file)))]
+        given = Path(folder) / "given.yaml"
+        given.write_text(yaml.safe_dump(_in_any_namespace(plan.params)), encoding="utf-8")
+        files = [given, own] if plan.params else [own]  # the later file prevails
+        words = [word for file in files for word in ("--params-file", str(file))]
+        if plan.namespace:
+            words += ["-r", f"__ns:=/{plan.namespace}"]
+        yield ["--ros-args", *words]
+
+
+def _in_any_namespace(file: Path | None) -> dict[str, Any]:
+    """Return a parameter file in which a node named without a path is meant wherever it is."""
+    content = read_map(file, what="node") if file else {}
+    return {key if "/" in key else f"/**/{key}": entry for key, entry in content.items()}
 
 
 def _run_parameters(plan: Plan) -> dict[str, Any]:

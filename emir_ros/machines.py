@@ -44,12 +44,16 @@ class Machine(Protocol):
 
     command: Topic
     plant: Any
+    truth: Any
 
     def step(self, commands: Signals, dt: float) -> None:
         """Go on by dt, s, under the signals of the command topic."""
 
     def signals(self, tick: int) -> Signals:
         """Return the signals of sensors and truth at a plant period."""
+
+    def show(self, stamp: int) -> None:
+        """Publish what is for the eye alone, stamped in ns."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +91,9 @@ class Joint1Machine:
         reading = measure(self.plant, self.truth, tick, self.state)
         return reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
 
+    def show(self, stamp: int) -> None:
+        """Publish nothing: joint 1 has no description."""
+
 
 class RobotMachine:
     """The whole robot, set up by the node's parameters.
@@ -101,6 +108,7 @@ class RobotMachine:
         require_pinocchio()
         from emir_analysis import robot_machine  # noqa: PLC0415 (needs Pinocchio)
         from emir_plant.robot.plant import RobotPlant  # noqa: PLC0415
+        from emir_ros.robot_picture import RobotPicture  # noqa: PLC0415
 
         self._by_signals = robot_machine
         start = declare_tree(node, Start()).initial_angles
@@ -108,6 +116,7 @@ class RobotMachine:
         for line in cautions(self.plant.robot.main):
             node.get_logger().warning(line)
         self.state = self.plant.initial(start.angles, pressure_lowering)
+        self._picture = RobotPicture(node, self.plant.mechanics)
         self.truth = self.plant.outputs(self.state)
 
     def step(self, commands: Signals, dt: float) -> None:
@@ -118,6 +127,10 @@ class RobotMachine:
     def signals(self, tick: int) -> Signals:
         """Return the signals of sensors and truth at a plant period."""
         return self._by_signals.sensor_signals(self.plant, self.truth, tick)
+
+    def show(self, stamp: int) -> None:
+        """Publish the joints of the description, stamped in ns."""
+        self._picture.publish(stamp, self.state)
 
 
 @dataclass(frozen=True, kw_only=True)

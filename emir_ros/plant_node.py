@@ -79,6 +79,11 @@ class PlantNode(Shell):
         """Return the simulated machine itself: Plant or RobotPlant."""
         return self.machine.plant
 
+    @property
+    def truth(self) -> Any:
+        """Return what no sensor blurs: Truth or RobotTruth."""
+        return self.machine.truth
+
     def _step(self, command: Signals) -> None:
         self.machine.step(command, PLANT_PERIOD_NS * 1e-9)
         self.tick += 1
@@ -87,6 +92,8 @@ class PlantNode(Shell):
         signals = self.machine.signals(self.tick)
         for topic in self._topics:
             self.publish(topic, stamp, signals)
+        if self.tick % (CONTROL_PERIOD_NS // PLANT_PERIOD_NS) == 0:
+            self.machine.show(stamp)
 
     def _show_progress(self) -> None:
         if time.monotonic() - self._said > 1.0:

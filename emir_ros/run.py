@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         params=options.params,
         lockstep=not options.realtime,
         model=options.model,
+        namespace=options.namespace.strip("/"),
     )
     try:
         plan = replace(plan, switches=tuple(map(_switch, options.switch)))
@@ -67,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     pace.add_argument("--realtime", action="store_true", help="as fast as the clock on the wall")
     pace.add_argument("--lockstep", action="store_true", help="as fast as it goes (default)")
     parser.add_argument("--processes", choices=("one", "many"), default="one")
+    parser.add_argument("--namespace", default="", metavar="NAME", help="of all nodes and topics")
     parser.add_argument("--bag", type=Path, required=True, metavar="DIR", help="the recording")
     return parser
 

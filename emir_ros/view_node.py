@@ -2,14 +2,14 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 
 from emir_analysis.errors import InputError
-from emir_analysis.view.command import outline_of_joint1, start_server
+from emir_analysis.view.command import start_server
 from emir_analysis.view.frames import Frame, tcp_deflection
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
@@ -17,6 +17,7 @@ from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
+    JOINT1,
     JOINT_STATES,
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
@@ -48,24 +49,32 @@ class ViewNode(Shell):
     """Sensors, reference and valve command -> a page on this computer."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("view_node", [], arguments)
+        super().__init__("view_node", [], arguments, robot=[])
         port: int = declare(self, "port", 8080, "of the page")
         reject_unknown(self)
         if not 0 < port <= HIGHEST_PORT:
             raise ParameterError(f"view_node: port = {port}: outside 1 ... {HIGHEST_PORT}")
         self._signals: dict[str, float] = {}
         self._stamp = math.nan
-        self._history: deque[Frame] = deque(maxlen=KEPT)
-        for topic in SHOWN:
-            self._listen(topic)
+        self._frame: Callable[[float, dict[str, float]], Any]
+        self._history: deque[Any] = deque(maxlen=KEPT)
         try:
             self._server = start_server(port)
         except InputError as error:
             raise ParameterError(f"view_node: {error}") from None
-        from emir_analysis.view.page import Page
+        from emir_analysis.view import robot, subject
+        from emir_analysis.view.page import Page, Subject
 
-        self._outline = outline_of_joint1()
-        self._page = Page(self._server, self._outline, "EMIR, live")
+        machine: Subject
+        if self.model == JOINT1:
+            machine = joint = subject.subject_of_joint1()
+            self._frame = lambda time, signals: frame(time, signals, joint.reach)
+        else:
+            machine = subject.robot_subject()
+            self._frame = robot.robot_frame
+        for topic in SHOWN if self.model == JOINT1 else robot.TOPICS:
+            self._listen(topic)
+        self._page = Page(self._server, machine, "EMIR, live")
         self.create_timer(PERIOD, self._show, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(f"http://localhost:{port} shows the graph")
 
@@ -90,7 +99,7 @@ class ViewNode(Shell):
     def _show(self) -> None:
         if math.isnan(self._stamp) or (self._history and self._stamp <= self._history[-1].time):
             return  # nothing new
-        self._history.append(frame(self._stamp, self._signals, self._outline.boom))
+        self._history.append(self._frame(self._stamp, self._signals))
         self._page.show(self._history[-1])
         if len(self._history) > 1:
             self._page.plot(list(self._history), self._stamp)

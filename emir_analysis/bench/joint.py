@@ -9,6 +9,7 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -229,7 +230,8 @@ def _growth(task: Task, seconds: float) -> list[Figure]:
             machines = np.tile(task.plant.record, number)
             name = f"{number} on {threads} core{'s' if threads > 1 else ''}"
             run = _many(starts, task.commands, machines, threads)
-            contenders.append(Contender(name, run, number * task.duration))
+            clock = time.perf_counter if threads > 1 else time.process_time
+            contenders.append(Contender(name, run, number * task.duration, clock=clock))
     figures = rates(contenders, "s/s", seconds)
     numba.set_num_threads(most)
     return figures

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from emir_analysis.errors import InputError
-from emir_analysis.run_signals import load_run
-from emir_analysis.view.arm import Outline
+from emir_analysis.run_signals import is_robot, load_run
 from emir_analysis.view.frames import frames
-from emir_plant.sheet import joint1
 
 if TYPE_CHECKING:
     import viser
@@ -27,32 +25,34 @@ def command(words: list[str], live: Callable[[list[str]], int]) -> int:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--bag", type=Path, help="a recording of the graph")
     source.add_argument("--live", action="store_true", help="the graph that is running")
+    parser.add_argument("--model", default="joint1", help="with --live: joint1 or robot")
     parser.add_argument("--port", type=int, default=8080, help="of the page, default 8080")
     options = parser.parse_args(words)
     if options.live:
-        return live(["--ros-args", "-p", f"port:={options.port}"])
+        model = f"model:={options.model}"
+        return live(["--ros-args", "-p", f"port:={options.port}", "-p", model])
     recording = load_run(options.bag)
-    outline = outline_of_joint1()
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     server = start_server(options.port)
     from emir_analysis.view.page import Page
     from emir_analysis.view.player import Player
+    from emir_analysis.view.robot import robot_frames
+    from emir_analysis.view.subject import robot_subject, subject_of_joint1
 
-    page = Page(server, outline, f"EMIR: {options.bag.resolve().name}")
-    player = Player(server, page, frames(recording, outline.boom))
+    title = f"EMIR: {options.bag.resolve().name}"
+    if is_robot(recording):
+        page, shown = Page(server, robot_subject(), title), robot_frames(recording)
+    else:
+        joint = subject_of_joint1()
+        page, shown = Page(server, joint, title), frames(recording, joint.reach)
+    player = Player(server, page, shown)
     sys.stdout.write(f"http://localhost:{server.get_port()} shows {options.bag}; Ctrl-C ends\n")
     sys.stdout.flush()
     player.run(stop)
     server.stop()
     return 0
-
-
-def outline_of_joint1() -> Outline:
-    """Return the drawing's lengths of EMIR's joint 1."""
-    g = joint1().geometry
-    return Outline(g.boom_length, g.triangle_a, g.triangle_b, g.triangle_gamma0)
 
 
 def start_server(port: int) -> "viser.ViserServer":

@@ -1,54 +1,52 @@
-"""The page: the arm in 3D, readings, plots over time. `viser` serves it and draws."""
+"""The page: a machine in 3D, readings, plots over time. `viser` serves it and draws."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import viser
 from viser import uplot
 
-from emir_analysis.view.arm import Outline, centreline, cylinder
-from emir_analysis.view.frames import Frame
-
 MOST_POINTS = 1000  # of a plot's line: a screen has not many more
-BOOM, STRAIGHT, CYLINDER = (209, 98, 43), (160, 168, 176), (11, 107, 181)
-OPEN, SHUT = (46, 139, 87), (194, 24, 91)
 FAINT = "#b7c0c8"
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A plot over time: a title and fields of Frame with label, factor and colour."""
+    """A plot over time: a title and fields of a frame with label, factor and colour."""
 
     title: str
     lines: tuple[tuple[str, str, float, str], ...]
 
 
-CHARTS = (
-    Chart("stroke / mm", (
-        ("reference_stroke", "h_d", 1e3, "#8a939c"), ("stroke", "h", 1e3, "#0b6bb5"),
-    )),
-    Chart("pressure / bar", (
-        ("pressure_lifting", "lifting", 1e-5, "#0b6bb5"),
-        ("pressure_lowering", "lowering", 1e-5, "#d1622b"),
-    )),
-    Chart("valve, logic block / %", (
-        ("valve_command", "valve", 100.0, "#2e8b57"),
-        ("logic_block", "logic block", 100.0, "#8e44ad"),
-    )),
-    Chart("TCP deflection / cm", (("tcp_deflection", "deflection", 100.0, "#d1622b"),)),
-)  # fmt: skip
+class Subject(Protocol):
+    """A machine that can be shown. Its frames are named tuples of floats; nan: not known."""
+
+    @property
+    def charts(self) -> tuple[Chart, ...]:
+        """Return its plots."""
+
+    @property
+    def reach(self) -> float:
+        """Return how far it stretches, m."""
+
+    def readings(self, frame: Any) -> list[tuple[str, float, str, int]]:
+        """Return what is shown in numbers: name, value, unit, digits."""
+
+    def draw(self, scene: viser.SceneApi, frame: Any, bending: float) -> None:
+        """Draw the machine, its bending so many times as large."""
 
 
 class Page:
     """Scene and plots of one machine on a viser server."""
 
-    def __init__(self, server: viser.ViserServer, outline: Outline, title: str) -> None:
-        self._outline = outline
+    def __init__(self, server: viser.ViserServer, subject: Subject, title: str) -> None:
+        self._subject = subject
         server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         server.gui.set_panel_label(title)
-        scene, reach = server.scene, outline.boom
+        scene, reach = server.scene, subject.reach
         scene.set_up_direction("+z")
         server.initial_camera.position = (0.45 * reach, -1.2 * reach, 0.45 * reach)
         server.initial_camera.look_at = (0.42 * reach, 0.0, 0.3 * reach)
@@ -57,41 +55,25 @@ class Page:
         self._scene = scene
         self._readings = server.gui.add_markdown("")
         self.bending = server.gui.add_slider("bending drawn times", 1, 20, 1, 5)
-        self._charts = [self._add_chart(server, chart) for chart in CHARTS]
+        self._charts = [self._add_chart(server, chart) for chart in subject.charts]
 
     @property
     def readings(self) -> str:
         """Return the numbers that are shown, as Markdown."""
         return self._readings.content
 
-    def show(self, frame: Frame) -> None:
+    def show(self, frame: Any) -> None:
         """Draw the machine as it is in the frame."""
-        self._readings.content = readings(frame)
-        if np.isnan(frame.angle):
-            return
-        bent = 0.0 if np.isnan(frame.tcp_deflection) else frame.tcp_deflection
-        points = centreline(self._outline, frame.angle, bent * self.bending.value)
-        straight = centreline(self._outline, frame.angle, 0.0)[[0, -1]]
-        foot, eye = cylinder(self._outline, frame.angle)
-        line = self._scene.add_line_segments
-        pairs = np.stack([points[:-1], points[1:]], axis=1)
-        line("/boom", pairs.astype(np.float32), BOOM, thickness=0.35)
-        line("/straight", straight[None].astype(np.float32), STRAIGHT, thickness=0.06)
-        line("/cylinder", np.stack([foot, eye])[None].astype(np.float32), CYLINDER, thickness=0.3)
-        is_open = np.isnan(frame.logic_block) or frame.logic_block > 0.5  # noqa: PLR2004 (half)
-        self._scene.add_icosphere(
-            "/logic_block", radius=0.3, color=OPEN if is_open else SHUT, position=tuple(foot)
-        )
-        self._scene.add_icosphere("/tcp", radius=0.3, color=BOOM, position=tuple(points[-1]))
+        self._readings.content = table(self._subject.readings(frame))
+        self._subject.draw(self._scene, frame, self.bending.value)
 
-    def plot(self, history: Sequence[Frame], now: float) -> None:
+    def plot(self, history: Sequence[Any], now: float) -> None:
         """Draw the history over time; what is later than `now`, s, is faint."""
         chosen = history[:: 1 + len(history) // MOST_POINTS]
-        columns = {
-            name: np.array([getattr(frame, name) for frame in chosen]) for name in Frame._fields
-        }
+        fields = history[0]._fields
+        columns = {name: np.array([getattr(frame, name) for frame in chosen]) for name in fields}
         past = columns["time"] <= now
-        for handle, chart in zip(self._charts, CHARTS, strict=True):
+        for handle, chart in zip(self._charts, self._subject.charts, strict=True):
             data = [columns["time"]]
             for name, _, factor, _ in chart.lines:
                 value = columns[name] * factor
@@ -110,21 +92,10 @@ class Page:
         )  # fmt: skip
 
 
-def readings(frame: Frame) -> str:
-    """Return the numbers of a frame as a table in Markdown, a dash for what is not known."""
-    rows = (
-        ("time", frame.time, 1.0, "s", 2),
-        ("joint angle", np.degrees(frame.angle), 1.0, "deg", 2),
-        ("stroke", frame.stroke, 1e3, "mm", 1),
-        ("wanted", frame.reference_stroke, 1e3, "mm", 1),
-        ("valve", frame.valve_command, 100.0, "%", 1),
-        ("lifting chamber", frame.pressure_lifting, 1e-5, "bar", 1),
-        ("lowering chamber", frame.pressure_lowering, 1e-5, "bar", 1),
-        ("logic block open", frame.logic_block, 100.0, "%", 0),
-        ("TCP deflection", frame.tcp_deflection, 100.0, "cm", 2),
-    )
+def table(readings: Sequence[tuple[str, float, str, int]]) -> str:
+    """Return name, value, unit as a table in Markdown, a dash for what is not known."""
     lines = ["| | | |", "|---|---:|---|"]
-    for name, value, factor, unit, digits in rows:
-        shown = "-" if np.isnan(value) else f"{value * factor:.{digits}f}"
+    for name, value, unit, digits in readings:
+        shown = "-" if np.isnan(value) else f"{value:.{digits}f}"
         lines.append(f"| {name} | {shown} | {unit} |")
     return "\n".join(lines)

@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from emir_plant.robot import linkage, reduction
+from emir_plant.robot import kinematics, linkage, reduction
+from emir_plant.robot.kinematics import Tree
 from emir_plant.robot.parameters import JOINTS, Robot
 from emir_plant.robot.reach import Reach, reach, record
 from emir_plant.robot.stiffness import cut_damping, cut_stiffness
@@ -52,6 +53,18 @@ class Mechanics:
     def _data(self) -> Any:
         return self.topology.model.createData()
 
+    @cached_property
+    def tree(self) -> Tree:
+        """The tree as the compiled functions read it."""
+        return kinematics.tree(self.topology)
+
+    @cached_property
+    def _tcp(self) -> tuple[int, Array]:
+        """The TCP's joint in `tree` and its place in that joint's frame, (3,), m."""
+        model = self.topology.model
+        frame = model.frames[model.getFrameId(TCP)]
+        return frame.parentJoint - 1, frame.placement.translation.copy()
+
     @property
     def size(self) -> int:
         """The number of degrees of freedom."""
@@ -84,10 +97,15 @@ class Mechanics:
 
     def bias(self, q: Array, v: Array) -> Array:
         """Return the generalised forces, (n,), that gravity and velocities ask of the drives."""
+        return self.posture_and_bias(q, v)[1]
+
+    def posture_and_bias(self, q: Array, v: Array) -> tuple[tuple[Array, Array], Array]:
+        """Return the tree's coordinates and the parts' slopes (see `expand`), and the bias."""
         t = self.topology
         z, rate, rest, slopes = self.expand(q, v)
         tree = pin.rnea(t.model, self._data, z, rate, rest)
-        return reduction.reduced_force(tree, t.independent, t.joints, t.parts, slopes)
+        force = reduction.reduced_force(tree, t.independent, t.joints, t.parts, slopes)
+        return (z, slopes), force
 
     def mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return both at once, in one pass over the linkages."""
@@ -115,11 +133,14 @@ class Mechanics:
 
     def tcp(self, q: Array) -> tuple[Array, Array]:
         """Return the TCP's position r_6, (3,) m, and orientation, (3, 3), columns x_6, y_6, z_6."""
-        z, _, _, _ = self.expand(q, np.zeros_like(q))
-        model = self.topology.model
-        pin.forwardKinematics(model, self._data, z)
-        place = pin.updateFramePlacement(model, self._data, model.getFrameId(TCP))
-        return place.translation.copy(), place.rotation.copy()
+        places, axes = self.tips(q)
+        return places[0], axes[0]
+
+    def tips(self, q: Array) -> tuple[Array, Array]:
+        """Return the TCP's position, (2, 3), m, and axes, (2, 3, 3): as it is, and unbent."""
+        t, (joint, place) = self.topology, self._tcp
+        axes, places = kinematics.tips(q, t.independent, t.joints, self.tree, joint)
+        return places + axes @ place, axes
 
     def ratios(self, q: Array) -> Array:
         """Return dh/dalpha of joints 1-5, (5,), m."""

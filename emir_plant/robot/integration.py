@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant.jit import compiled
-from emir_plant.robot import actuators, linkage
+from emir_plant.robot import actuators, elimination, linkage
 from emir_plant.robot.actuators import ACTUATORS
+from emir_plant.robot.kinematics import Tree
 from emir_plant.robot.stiffness import COORDINATES
 
 Array = NDArray[np.float64]
@@ -35,8 +36,8 @@ HELD_AT, HOLD_STIFFNESS, HOLD_DAMPING = 0, 1, 2  # rows of the brakes, (3, 6)
 class Tables(NamedTuple):
     """The machine as the compiled functions read it."""
 
-    spring: Array  # of every cut, (6, 6)
-    damper: Array  # of every cut, (6, 6)
+    spring: Array  # of every cut's coordinates, (6,)
+    damper: Array  # likewise
     joints: Index  # places in q, (6,)
     cuts: Index  # places in q, (15, 6)
     linkages: NDArray[Any]  # records, (5,)
@@ -44,23 +45,7 @@ class Tables(NamedTuple):
     stops: Array  # (4, 6)
     drives: NDArray[Any]  # records, (6,)
     pump: Array  # see `actuators.pump_record`
-
-
-@compiled
-def _solve(lower: Array, upper: Array, x: Array) -> None:
-    """Solve L U x = x in place, U = L^T; (n, n), both with contiguous rows.
-
-    Both sweeps take multiples of a row away, which the compiler turns into vector instructions.
-    """
-    n = x.size
-    for j in range(n):
-        x[j] /= upper[j, j]
-        for i in range(j + 1, n):
-            x[i] -= x[j] * upper[j, i]
-    for j in range(n - 1, -1, -1):
-        x[j] /= lower[j, j]
-        for i in range(j):
-            x[i] -= x[j] * lower[j, i]
+    tree: Tree  # of the bodies
 
 
 @compiled
@@ -114,16 +99,15 @@ def _oil(x: Array, h: float, commands: Array, motion: Array, t: Tables) -> None:
 
 
 @compiled
-def _stiffen(mass: Array, oil: Array, h: float, ahead: float, motion: Array, t: Tables) -> None:
-    """Add to the mass matrix, in place, what the midpoint rule takes implicitly.
+def _stiffness_added(oil: Array, h: float, ahead: float, motion: Array, t: Tables) -> Array:
+    """Return what the midpoint rule adds to the mass matrix's diagonal, (n,).
 
-    ahead: time, s, for which the matrix is to serve.
+    ahead: time, s, for which it is to serve.
     """
-    block = 0.5 * h * t.damper + 0.25 * h * h * t.spring
+    added = np.zeros(t.joints.size + t.cuts.size)
     for c in range(t.cuts.shape[0]):
         for i in range(COORDINATES):
-            for j in range(COORDINATES):
-                mass[t.cuts[c, i], t.cuts[c, j]] += block[i, j]
+            added[t.cuts[c, i]] = 0.5 * h * t.damper[i] + 0.25 * h * h * t.spring[i]
     for k in range(ACTUATORS):
         # friction may be steep where a piston stands; an end stop always is
         load = actuators.oil_force(oil, k, t.drives)
@@ -135,7 +119,8 @@ def _stiffen(mass: Array, oil: Array, h: float, ahead: float, motion: Array, t: 
         square = motion[RATIO, k] * motion[RATIO, k]
         damping = damping * square + t.brakes[HOLD_DAMPING, k]
         stiffness = stiffness * square + t.brakes[HOLD_STIFFNESS, k]
-        mass[t.joints[k], t.joints[k]] += 0.5 * h * damping + 0.25 * h * h * stiffness
+        added[t.joints[k]] = 0.5 * h * damping + 0.25 * h * h * stiffness
+    return added
 
 
 @compiled
@@ -158,11 +143,8 @@ def _write_impulse(
         impulse[at] += h * (torque - t.brakes[HOLD_DAMPING, k] * v[at])
     for c in range(t.cuts.shape[0]):
         for i in range(COORDINATES):
-            total = 0.0
-            for j in range(COORDINATES):
-                at = t.cuts[c, j]
-                total += t.spring[i, j] * (q[at] + 0.5 * h * v[at]) + t.damper[i, j] * v[at]
-            impulse[t.cuts[c, i]] -= h * total
+            at = t.cuts[c, i]
+            impulse[at] -= h * (t.spring[i] * (q[at] + 0.5 * h * v[at]) + t.damper[i] * v[at])
 
 
 @compiled
@@ -173,25 +155,25 @@ def period(
     commands: Array,
     h: float,
     steps: int,
-    mass: Array,
+    posture: tuple[Array, Array],
     bias: Array,
     t: Tables,
 ) -> None:
     """Advance oil, (31,), q and v, (n,), in place by `steps` steps of h, s.
 
-    commands: (6,). mass: (n, n), overwritten. bias: (n,).
+    commands: (6,). posture: coordinates of the tree and slopes of the linkages' parts for which
+    the mass matrix holds (`reduction.expand`). bias: (n,).
     """
     motion, change = np.empty((4, ACTUATORS)), np.empty(q.size)
     drive_motion(q, v, t, motion)
-    _stiffen(mass, oil, h, steps * h, motion, t)
-    lower = np.ascontiguousarray(np.linalg.cholesky(mass))
-    upper = np.ascontiguousarray(lower.T)
+    added = _stiffness_added(oil, h, steps * h, motion, t)
+    factors = elimination.factorized(posture[0], posture[1], added, t.tree)
     _oil(oil, 0.5 * h, commands, motion, t)
     for step in range(steps):
         for i in range(q.size):
             change[i] = -h * bias[i]
         _write_impulse(oil, q, v, h, motion, t, change)
-        _solve(lower, upper, change)
+        elimination.solve(factors, change)
         for i in range(q.size):
             q[i] += h * (v[i] + 0.5 * change[i])
             v[i] += change[i]

@@ -82,10 +82,7 @@ def rest(mechanics: Mechanics, joints: Array) -> Rest:
 
 def deflection(mechanics: Mechanics, q: Array) -> Deflection:
     """Return the TCP's deflection at the coordinates q, (n,), moving or not."""
-    stiff = np.zeros_like(q)
-    stiff[mechanics.topology.joints] = q[mechanics.topology.joints]
-    straight, axes = mechanics.tcp(stiff)
-    bent, bent_axes = mechanics.tcp(q)
+    (bent, straight), (bent_axes, axes) = mechanics.tips(q)
     turn = bent_axes @ axes.T
     # small enough for the antisymmetric part to be the rotation vector's sine
     sine = 0.5 * np.array(

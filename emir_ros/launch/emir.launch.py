@@ -1,6 +1,7 @@
 """The whole graph in real time, each node a process of its own.
 
 ros2 launch emir_ros emir.launch.py bag:=my_run controller:=cascade namespace:=arm
+ros2 launch emir_ros emir.launch.py bag:=my_run model:=robot
 
 With `standby:=pfc` a second controller holds its state ready, and selector_node, whose parameter
 `controller` may be set at any time, chooses.
@@ -12,7 +13,11 @@ from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution
+from launch.substitutions import (
+    LaunchConfiguration,
+    NotEqualsSubstitution,
+    PythonExpression,
+)
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -21,20 +26,22 @@ PACKAGE = "emir_ros"
 
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments and the nodes: five, or seven with a second controller."""
-    parameters = Path(get_package_share_directory(PACKAGE)) / "config" / "emir.yaml"
+    config = Path(get_package_share_directory(PACKAGE)) / "config"
+    parameters = [f"{config}/", LaunchConfiguration("model"), ".yaml"]
     controller, second = LaunchConfiguration("controller"), LaunchConfiguration("standby")
     two = NotEqualsSubstitution(second, "")
     if_two = IfCondition(two)
     return LaunchDescription(
         [
             _argument("bag", None, "folder of the recording; must not exist"),
-            _argument("controller", "cascade", "outer controller: cascade, pfc, pfc_tip"),
+            _argument("controller", "cascade", "cascade, pfc, pfc_tip, lqg, mpc"),
             _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
-            _argument("params", str(parameters), "YAML file with the nodes' parameters"),
+            _argument("model", "joint1", "joint1, or robot: the whole robot, with cascade"),
+            _argument("params", parameters, "YAML file with the nodes' parameters"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
-            _node("force_loop_node"),
+            _node("force_loop_node", None, IfCondition(_gives_velocity(controller))),
             _node([controller, "_node"], {"standby": ParameterValue(two, value_type=bool)}),
             _node([second, "_node"], {"standby": True}, if_two),
             _node("selector_node", {"controller": controller}, if_two),
@@ -43,7 +50,14 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def _argument(name: str, default: str | None, description: str) -> DeclareLaunchArgument:
+def _gives_velocity(controller: LaunchConfiguration) -> PythonExpression:
+    """Tell whether the force loop is needed: lqg and mpc give the valve command themselves."""
+    return PythonExpression(["'", controller, "' not in ('lqg', 'mpc')"])
+
+
+def _argument(
+    name: str, default: str | list[object] | None, description: str
+) -> DeclareLaunchArgument:
     return DeclareLaunchArgument(name, default_value=default, description=description)
 
 
@@ -56,7 +70,10 @@ def _node(
         package=PACKAGE,
         executable=executable,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[LaunchConfiguration("params"), parameters or {}],
+        parameters=[
+            LaunchConfiguration("params"),
+            {"model": LaunchConfiguration("model")} | (parameters or {}),
+        ],
         condition=condition,
         output="screen",
     )

@@ -161,8 +161,9 @@ def test_compare_command_over_a_grid(tmp_path: Path, capsys: pytest.CaptureFixtu
     with table.open() as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 3 * 2 * 2
+    assert {row["case_error"] for row in rows} == {"none"}
     margins = {
-        (row["angle"], row["payload"]): float(row["gain_margin"])
+        (row["case_angle"], row["case_payload"]): float(row["gain_margin"])
         for row in rows
         if (row["controller"], row["move"]) == ("pfc, preview", "lift")
     }

@@ -95,10 +95,23 @@ def test_the_designs_that_come_with_the_project_are_what_the_command_makes(tmp_p
             assert answers[0] == pytest.approx(answers[1], rel=1e-6)
 
 
-@pytest.mark.parametrize(("payload", "stable"), [(0.0, True), (1500.0, False)])
-def test_stability_is_what_the_nonlinear_machine_shows(payload: float, stable: bool) -> None:  # noqa: FBT001 (a parameter)
-    """Designed empty at 45 deg, tried at 60 deg: it swings on after the move, or comes to rest."""
-    angle = math.radians(60.0)
+@pytest.mark.parametrize(
+    ("degrees", "payload", "stable"),
+    [
+        (45.0, 0.0, True),
+        (60.0, 0.0, True),
+        (45.0, 500.0, True),
+        (45.0, 1500.0, False),
+        (60.0, 1500.0, False),
+    ],
+)
+def test_stability_is_what_the_nonlinear_machine_shows(
+    degrees: float,
+    payload: float,
+    stable: bool,  # noqa: FBT001 (a parameter)
+) -> None:
+    """Designed empty at 45 deg, tried elsewhere: it swings on after the move, or comes to rest."""
+    angle = math.radians(degrees)
     machine = with_values(joint1(), {"geometry.payload": payload})
     law = Pfc(pfc_file.load(pfc_file.default_file("stroke"), "stroke"))
     point = OperatingPoint(angle=angle, payload=payload)
@@ -109,8 +122,8 @@ def test_stability_is_what_the_nonlinear_machine_shows(payload: float, stable: b
         np.ptp(run["tcp_deflection"][round(a / 0.008) : round((a + 3.0) / 0.008)])
         for a in (4.3, 13.3)
     )
-    assert (late < 0.02) == stable  # m
-    assert (late < early) == stable
+    assert (late < 0.03) == stable  # m: a step of the resolver is 3 cm at the TCP
+    assert stable or late > early
 
 
 def test_a_slow_observer_and_a_heavy_design_hold_everywhere() -> None:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,12 @@ from playwright.sync_api import Page
 from emir_analysis.cli import main
 from emir_analysis.run_signals import load_run
 from emir_analysis.view.arm import Outline, centreline, cylinder
-from emir_analysis.view.command import outline_of_joint1
 from emir_analysis.view.frames import Frame, frames, tcp_deflection
-from emir_analysis.view.page import readings
+from emir_analysis.view.page import table
+from emir_analysis.view.robot import JOINTS, SIGNALS, bent_line, robot_frame
+from emir_analysis.view.robot import centreline as robot_centreline
+from emir_analysis.view.subject import robot_subject, subject_of_joint1
+from emir_control.arm import Arm
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
@@ -44,7 +48,7 @@ def test_the_cylinder_is_as_long_as_the_linkage_says() -> None:
     """Its length grows by the stroke of the machine's own linkage."""
 
     def length(angle: float) -> float:
-        return float(np.linalg.norm(np.subtract(*cylinder(outline_of_joint1(), angle))))
+        return float(np.linalg.norm(np.subtract(*cylinder(subject_of_joint1().outline, angle))))
 
     plant = Plant(joint1())
     stroke = plant.outputs(plant.initial(0.9)).stroke
@@ -67,7 +71,34 @@ def test_frames_hold_what_was_recorded() -> None:
     command = run["valve_command"]
     assert {f.valve_command for f in shown} == set(command.value)  # held, nothing in between
     nothing = Frame(1.0, *(math.nan for _ in Frame._fields[1:]))
-    assert readings(nothing).count(" - ") == len(Frame._fields) - 1
+    shown_numbers = table(subject_of_joint1().readings(nothing))
+    assert shown_numbers.count(" - ") == len(Frame._fields) - 1
+
+
+@pytest.mark.parametrize("angles", [(0.3, 0.8, -0.2, -0.2, -0.3, -0.3), (-2.0, 1.2, 0, -1, 0, 0)])
+def test_the_robots_arms_end_where_the_controllers_geometry_has_the_tcp(
+    angles: tuple[float, ...],
+) -> None:
+    subject, joints = robot_subject(), np.array(angles)
+    line = robot_centreline(subject.arm, joints)
+    assert np.allclose(line[0], [0.0, 0.0, subject.arm.height])
+    tcp = Arm(replace(subject.arm, sag=0)).tcp(joints)[:3]
+    assert np.allclose(line[-1], tcp)
+    pieces = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    assert pieces.sum() == pytest.approx(22.5)  # paper 1
+    bent = bent_line(line, np.array([0.1, 0.0, -0.2]))
+    assert np.allclose(bent[0], line[0])
+    assert np.allclose(bent[-1] - tcp, [0.1, 0.0, -0.2])
+
+
+def test_a_robots_frame_knows_how_far_each_joint_is_off() -> None:
+    given = {name: float(k) for k, name in enumerate(SIGNALS)}
+    shown = robot_frame(1.5, given)
+    for joint in JOINTS:
+        wanted = given[f"{joint}_stroke"] - given[f"{joint}_reference_stroke"]
+        assert getattr(shown, f"{joint}_error") == wanted
+    missing = table(robot_subject().readings(robot_frame(1.5, {})))
+    assert missing.count(" - ") == len(JOINTS) + 3  # angles and the TCP's place
 
 
 @pytest.fixture

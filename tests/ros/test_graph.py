@@ -24,8 +24,9 @@ from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.info import info, parameters_text
+from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
-from emir_analysis.outer_loop import CascadeLoop, PfcLoop, PfcTipLoop
+from emir_analysis.outer_loop import CascadeLoop, LqgLoop, PfcLoop, PfcTipLoop
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
@@ -33,6 +34,8 @@ from emir_analysis.stamped import same
 from emir_analysis.switching import Switch, SwitchedLoop
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
+from emir_control.lqg import Lqg
+from emir_control.mpc import Mpc
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
@@ -61,6 +64,8 @@ def _loop_signals(controller: str) -> dict[str, np.ndarray]:
         "pfc_tip": lambda: PfcTipLoop(
             Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
         ),
+        "lqg": lambda: LqgLoop(Lqg(lqg_parameters(joint1()))),
+        "mpc": lambda: LqgLoop(Mpc(lqg_parameters(joint1())), "mpc"),
     }[controller]()
     trajectory = named("lift-lower", TrajectoryParameters())
     return ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, DURATION)
@@ -93,7 +98,15 @@ def _assert_equal(bag: Path, controller: str) -> None:
 
 @pytest.mark.parametrize(
     ("controller", "processes"),
-    [("cascade", "one"), ("cascade", "many"), ("pfc", "one"), ("pfc", "many"), ("pfc_tip", "one")],
+    [
+        ("cascade", "one"),
+        ("cascade", "many"),
+        ("pfc", "one"),
+        ("pfc", "many"),
+        ("pfc_tip", "one"),
+        ("lqg", "one"),
+        ("mpc", "one"),
+    ],
 )
 def test_lockstep_graph_equals_the_plain_loop(
     controller: str, processes: str, tmp_path: Path
@@ -105,7 +118,8 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert finished.returncode == 0, finished.stderr
     assert "tcp_deflection_static" in finished.stdout
     _assert_equal(bag, controller)
-    for node in ("trajectory", controller, "force_loop", "plant"):
+    others = () if controller in {"lqg", "mpc"} else ("force_loop",)
+    for node in ("trajectory", controller, *others, "plant"):
         assert same(replay(bag, node, {})), node
 
 
@@ -259,6 +273,7 @@ def test_an_interrupted_run_keeps_what_it_has(
 
 BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
+    "namespace": (["--namespace", "2nd"], "", "namespace '2nd': letters, digits"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
@@ -354,6 +369,40 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     again = tmp_path / "again.yaml"
     again.write_text(parameters_text(info(bag)))
     assert read_parameters(again) == parameters  # the file sets up the same run
+
+
+def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> None:
+    """Each in its namespace, at the same time: each records what it records alone."""
+    short = ["--duration", "2", "--bag"]
+    assert run_graph([*short, str(tmp_path / "alone")]) == 0
+    gains = {"left": 2.0, "right": 1.0}
+    for name, gain in gains.items():
+        (tmp_path / f"{name}.yaml").write_text(
+            f"cascade_node: {{ros__parameters: {{gain: {gain}}}}}\n"
+        )
+    commands = {
+        name: ["--namespace", name, "--params", str(tmp_path / f"{name}.yaml"), *short]
+        for name in gains
+    }
+    with (
+        _started([*commands["left"], str(tmp_path / "left")]) as left,
+        _started([*commands["right"], str(tmp_path / "right")]) as right,
+    ):
+        said = left.communicate(timeout=120), right.communicate(timeout=120)
+    assert left.returncode == right.returncode == 0, said
+    alone = _raw(tmp_path / "alone")
+    same_machine, other_gain = _raw(tmp_path / "left"), _raw(tmp_path / "right")
+    assert same_machine == {f"/left{topic}": data for topic, data in alone.items()}
+    assert other_gain.keys() == {f"/right{topic}" for topic in alone}
+    assert other_gain["/right/truth"] != alone["/truth"]
+
+
+def _raw(bag: Path) -> dict[str, list[bytes]]:
+    found: dict[str, list[bytes]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages():
+            found.setdefault(connection.topic, []).append(bytes(data))
+    return found
 
 
 def test_parameters_reach_the_nodes(tmp_path: Path) -> None:

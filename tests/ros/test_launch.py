@@ -37,7 +37,7 @@ def launch(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
 def test_every_executable_is_started(launch: MagicMock) -> None:
     started = {"".join(call.kwargs["executable"]) for call in launch.Node.call_args_list}
     executables = {path.name for path in EXECUTABLES.glob("*_node")}
-    outer = {f"{name}_node" for name in ("cascade", "pfc", "pfc_tip")}
+    outer = {f"{name}_node" for name in ("cascade", "pfc", "pfc_tip", "lqg", "mpc")}
     beside = {"replay_node", "view_node"}  # for those who look at it
     chosen = {"<controller>_node", "<standby>_node"}
     assert started - chosen | outer | beside == executables
@@ -46,7 +46,7 @@ def test_every_executable_is_started(launch: MagicMock) -> None:
 
 def test_every_configuration_is_a_declared_argument(launch: MagicMock) -> None:
     declared = {call.args[0] for call in launch.DeclareLaunchArgument.call_args_list}
-    assert declared == {"bag", "controller", "standby", "namespace", "params"}
+    assert declared == {"bag", "controller", "model", "standby", "namespace", "params"}
     used = str(launch.Node.call_args_list)
     assert all(f"<{name}>" in used for name in declared)
 
@@ -56,5 +56,7 @@ def test_parameter_file_is_installed(launch: MagicMock) -> None:
         call.args[0]: call.kwargs["default_value"]
         for call in launch.DeclareLaunchArgument.call_args_list
     }
-    name = Path(defaults["params"]).relative_to("/share/emir_ros/config")
-    assert (LAUNCH_FILE.parents[1] / "config" / name).is_file()
+    for model in ("joint1", "robot"):
+        file = Path("".join(defaults["params"]).replace("<model>", model))
+        name = file.relative_to("/share/emir_ros/config")
+        assert (LAUNCH_FILE.parents[1] / "config" / name).is_file()

@@ -13,6 +13,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir
 from rosbags.highlevel import AnyReader
 
 from emir_analysis.info import info
+from emir_analysis.replay import replay
 from emir_analysis.robot_controls import (
     RobotCascadeControl,
     RobotForceLoopControl,
@@ -26,6 +27,7 @@ from emir_analysis.robot_setup import (
     path_parameters,
     trajectory,
 )
+from emir_analysis.stamped import same
 from emir_control.cascade import Cascade
 from emir_control.trajectory import TrajectoryParameters
 from emir_msgs_py import conversions
@@ -56,6 +58,8 @@ def test_lockstep_graph_equals_the_plain_loop(
             RobotForceLoopControl(force_loops(sheet)),
         ],
     ).run(Posture().angles, 2e6, DURATION)
+    for node in ("trajectory", "cascade", "force_loop"):
+        assert same(replay(bag, node, {})), node
     with AnyReader([bag]) as reader:
         messages: dict[str, list[object]] = {}
         for connection, _, data in reader.messages():
@@ -70,6 +74,48 @@ def test_lockstep_graph_equals_the_plain_loop(
         for name in topic.fields:
             values = [conversions.values(topic, message)[name] for message in found]
             assert np.array_equal(values, loop[name]), name
+
+
+def test_description_and_its_joints_are_published() -> None:
+    """What robot_state_publisher needs, read by Pinocchio's parser."""
+    import pinocchio as pin
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
+
+    from emir_ros import qos
+    from emir_ros.plant_node import PlantNode
+
+    rclpy.init()
+    try:
+        heard: dict[str, object] = {}
+        listener, executor = Node("rviz"), SingleThreadedExecutor()
+        latched = qos.offered(lockstep=True)
+        joints = "description_joint_states"
+        for kind, topic in ((String, "robot_description"), (JointState, joints)):
+            profile = latched if kind is String else 10
+            listener.create_subscription(
+                kind, topic, lambda m, t=topic: heard.setdefault(t, m), profile
+            )
+        plant = PlantNode(["--ros-args", "-p", "model:=robot"])
+        executor.add_node(listener)
+        executor.add_node(plant)
+        for _ in range(2000):
+            executor.spin_once(timeout_sec=0.1)
+            if len(heard) == 2:
+                break
+        model = pin.buildModelFromXML(heard["robot_description"].data)  # type: ignore[attr-defined]
+        shown = heard[joints]
+        assert set(shown.name) == set(model.names) - {"universe"}  # type: ignore[attr-defined]
+        at = dict(zip(shown.name, shown.position, strict=True))  # type: ignore[attr-defined]
+        assert at["joint1"] == pytest.approx(Posture().joint1, abs=1e-3)
+        assert at["arm1_section2_pitch"] > 1e-5  # bent down by the weight
+    finally:
+        listener.destroy_node()
+        plant.destroy_node()
+        rclpy.shutdown()
 
 
 BAD = {

@@ -21,6 +21,8 @@ PACKAGE = "emir_ros"
 NODES = (
     "cascade_node",
     "force_loop_node",
+    "lqg_node",
+    "mpc_node",
     "pfc_node",
     "pfc_tip_node",
     "plant_node",

@@ -1,0 +1,39 @@
+"""`emir urdf`: the robot's description as a file."""
+
+import argparse
+from pathlib import Path
+
+from emir_analysis.errors import InputError
+from emir_plant.robot import require_pinocchio
+from emir_plant.robot.sheet import robot
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the command's options."""
+    about = "Write the whole robot as URDF: every joint, linkage part and cut; needs Pinocchio."
+    options = argparse.ArgumentParser(prog="emir urdf", description=about)
+    options.add_argument("file", type=Path, metavar="FILE")
+    options.add_argument("--robot", type=Path, metavar="YAML", help="default: EMIR's robot.yaml")
+    options.add_argument("--machine", type=Path, metavar="YAML", help="its main joint's")
+    return options
+
+
+def command(options: argparse.Namespace) -> str:
+    """Write the file, read it back with Pinocchio, and return what is in it.
+
+    Raises InputError where it cannot be written, ParameterError for a bad sheet.
+    """
+    require_pinocchio()
+    import pinocchio as pin  # noqa: PLC0415 (an extra)
+
+    from emir_plant.robot.dynamics import Mechanics  # noqa: PLC0415 (needs Pinocchio)
+    from emir_plant.robot.urdf import urdf  # noqa: PLC0415
+
+    text = urdf(Mechanics(robot(options.robot, options.machine)))
+    try:
+        options.file.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{options.file}: {error.strerror}") from None
+    model = pin.buildModelFromUrdf(str(options.file))
+    mass = pin.computeTotalMass(model)
+    return f"{options.file}: {model.njoints - 1} joints, {mass:.0f} kg, read back by Pinocchio"

@@ -1,0 +1,162 @@
+"""Where every body of the tree is and how every coordinate moves it, compiled.
+
+All in the axes of the ground. A motion is the velocity that it gives to a point at the ground's
+origin, moved along with the body, and the angular velocity, (6,).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_plant.jit import compiled
+from emir_plant.robot.topology import Topology
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+TURN, SLIDE, SHIFT, ZYX = 0, 1, 2, 3  # kinds of a joint: about an axis, along it, three, three
+CHAIN = -1  # driver of a joint that is no part of a linkage
+GROUND = -1  # as a parent
+
+
+class Tree(NamedTuple):
+    """The tree of `topology.py` as the compiled functions read it, (k,) joints, parents first."""
+
+    kinds: Index
+    parents: Index  # joint that carries it, -1 the ground
+    places: Array  # (k, 3) in the parent's frame, m; all frames are parallel at rest
+    axes: Array  # (k, 3)
+    coordinates: Index  # first place in the tree's coordinates
+    drivers: Index  # linkage (0-4) of a part, or CHAIN
+    slopes: Index  # of a part its place among the slopes, or CHAIN
+    masses: Array  # kg
+    centres: Array  # (k, 3), m
+    inertias: Array  # (k, 3, 3) about the centre, kg m^2
+
+
+def tree(t: Topology) -> Tree:
+    """Return the tree of a robot."""
+    model, count = t.model, t.model.njoints - 1
+    drivers, slopes = np.full(count, CHAIN), np.full(count, CHAIN)
+    first = np.array([model.idx_vs[j] for j in range(1, model.njoints)])
+    for k, (place, driver, _) in enumerate(t.parts):
+        drivers[first == place], slopes[first == place] = driver, k
+    kinds, axes = np.zeros(count, dtype=np.int64), np.zeros((count, 3))
+    for k, joint in enumerate(model.joints[1:]):
+        kinds[k], axes[k] = _kind(joint.shortname(), joint)
+    bodies = list(model.inertias)[1:]
+    return Tree(
+        kinds,
+        np.array([model.parents[j] - 1 for j in range(1, model.njoints)]),
+        np.array([model.jointPlacements[j].translation for j in range(1, model.njoints)]),
+        axes,
+        first,
+        drivers,
+        slopes,
+        np.array([body.mass for body in bodies]),
+        np.array([body.lever for body in bodies]),
+        np.array([body.inertia for body in bodies]),
+    )
+
+
+def _kind(name: str, joint: Any) -> tuple[int, Array]:
+    if name == "JointModelRZ":
+        return TURN, np.array([0.0, 0.0, 1.0])
+    if name == "JointModelRevoluteUnaligned":
+        return TURN, np.array(joint.extract().axis)
+    if name == "JointModelPX":
+        return SLIDE, np.array([1.0, 0.0, 0.0])
+    return {"JointModelTranslation": SHIFT, "JointModelSphericalZYX": ZYX}[name], np.zeros(3)
+
+
+@compiled
+def _turn(axes: Array, at: Array, angle: float) -> None:
+    """Turn a frame, axes (3, 3) in the columns, about a unit vector in it, in place."""
+    c, s = math.cos(angle), math.sin(angle)
+    for row in range(3):
+        x, y, z = axes[row, 0], axes[row, 1], axes[row, 2]
+        along = (1.0 - c) * (x * at[0] + y * at[1] + z * at[2])
+        axes[row, 0] = c * x + along * at[0] + s * (y * at[2] - z * at[1])
+        axes[row, 1] = c * y + along * at[1] + s * (z * at[0] - x * at[2])
+        axes[row, 2] = c * z + along * at[2] + s * (x * at[1] - y * at[0])
+
+
+@compiled
+def _write_turning(axes: Array, place: Array, at: Array, motion: Array) -> None:
+    """Write the motion, (6,), of turning about a unit vector of a frame at a place."""
+    for i in range(3):
+        motion[3 + i] = axes[i, 0] * at[0] + axes[i, 1] * at[1] + axes[i, 2] * at[2]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        motion[i] = place[j] * motion[3 + k] - place[k] * motion[3 + j]
+
+
+@compiled
+def frames(z: Array, t: Tree) -> tuple[Array, Array, Array]:
+    """Return of every joint's frame the axes, (k, 3, 3) in the columns, and the place, (k, 3), m.
+
+    And of every coordinate its motion, (len(z), 6). z: the tree's coordinates.
+    """
+    count = t.kinds.size
+    axes, places = np.empty((count, 3, 3)), np.empty((count, 3))
+    motions = np.zeros((z.size, 6))
+    units = np.eye(3)
+    for k in range(count):
+        own, at = axes[k], places[k]
+        if t.parents[k] == GROUND:
+            own[:], at[:] = units, t.places[k]
+        else:
+            _carry(axes[t.parents[k]], places[t.parents[k]], t.places[k], own, at)
+        first = t.coordinates[k]
+        if t.kinds[k] == TURN:
+            _write_turning(own, at, t.axes[k], motions[first])
+            _turn(own, t.axes[k], z[first])
+        elif t.kinds[k] == SLIDE:
+            _slide(own, t.axes[k], z[first], at, motions[first])
+        elif t.kinds[k] == SHIFT:
+            for n in range(3):
+                _slide(own, units[n], z[first + n], at, motions[first + n])
+        else:
+            for n in range(3):
+                _write_turning(own, at, units[2 - n], motions[first + n])
+                _turn(own, units[2 - n], z[first + n])
+    return axes, places, motions
+
+
+@compiled
+def _carry(axes: Array, place: Array, offset: Array, own: Array, at: Array) -> None:
+    """Write to own and at the frame of a joint that its parent carries at an offset, m."""
+    for i in range(3):
+        at[i] = place[i]
+        for j in range(3):
+            own[i, j] = axes[i, j]
+            at[i] += axes[i, j] * offset[j]
+
+
+@compiled
+def _slide(axes: Array, along: Array, way: float, at: Array, motion: Array) -> None:
+    """Move a place along a unit vector of a frame, m, in place, and write the motion."""
+    for i in range(3):
+        motion[i] = axes[i, 0] * along[0] + axes[i, 1] * along[1] + axes[i, 2] * along[2]
+        at[i] += way * motion[i]
+
+
+@compiled
+def tips(q: Array, independent: Index, joints: Index, t: Tree, joint: int) -> tuple[Array, Array]:
+    """Return axes, (2, 3, 3), and place, (2, 3), m, of a joint's frame: as it is, and unbent.
+
+    For a joint of the chain, on which the linkages' coordinates have no influence.
+    """
+    axes, places = np.empty((2, 3, 3)), np.empty((2, 3))
+    z = np.zeros(independent.size + np.count_nonzero(t.drivers != CHAIN))
+    for k in range(q.size):
+        z[independent[k]] = q[k]
+    for n in range(2):
+        all_axes, all_places, _ = frames(z, t)
+        axes[n], places[n] = all_axes[joint], all_places[joint]
+        z[:] = 0.0
+        for k in joints:
+            z[independent[k]] = q[k]
+    return axes, places

@@ -339,20 +339,39 @@ def _diagnose(words: list[str]) -> int:
     from emir_plant.actuator import is_actuator
 
     parser = argparse.ArgumentParser(prog="emir diagnose")
-    parser.add_argument("bag", type=Path, help="the recording to find out from")
+    parser.add_argument("bag", type=Path, nargs="+", help="recordings to find out from")
     parser.add_argument("--datasheet", type=Path, required=True, help="YAML of the machine")
     parser.add_argument("--signals", type=Path, required=True, help="YAML: signal, topic, field")
-    parser.add_argument("--judge", type=Path, metavar="BAG", help="the recording to be judged on")
+    parser.add_argument(
+        "--judge", type=Path, nargs="+", action="extend", metavar="BAG",
+        help="recordings to be judged on",
+    )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")
+    parser.add_argument(
+        "--model-out", type=Path, metavar="FILE",
+        help="write the machine as found: parameters of the plant node, with its effects",
+    )  # fmt: skip
+    parser.add_argument(
+        "--predictions", type=Path, metavar="DIR", help="write the simulated runs as MCAP"
+    )
     o = parser.parse_args(words)
     if is_actuator(o.datasheet):
+        judges = o.judge or [None]
+        if len(o.bag) > 1 or len(judges) > 1:
+            raise InputError(
+                f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one"
+            )
         found = actuator.command(
-            o.bag, o.datasheet, o.signals, o.judge, json=o.json, html=o.html, progress=_progress
-        )
+            o.bag[0], o.datasheet, o.signals, judges[0], json=o.json, html=o.html,
+            model_out=o.model_out, predictions=o.predictions, progress=_progress,
+        )  # fmt: skip
         print(actuator.summary(found))
         return 0
-    diagnosis = command(o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress)
+    diagnosis = command(
+        o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
+        model_out=o.model_out, predictions=o.predictions,
+    )  # fmt: skip
     print(summary(diagnosis))
     return 0
 

@@ -59,7 +59,7 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     headings. Raises ParameterError, naming file and key and what is allowed, for a file that
     cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
-    content = read_map(path, what="parameters")
+    content = _of_plant_node(read_map(path, what="parameters"))
     base = content.pop(BASED_ON, None)
     if base is not None:
         content = _over(_base(path, base), content)
@@ -132,6 +132,15 @@ def _there_are(path: str, known: Iterable[str]) -> str:
     names = [name.rpartition(".") for name in known]
     inside = [name for where, _, name in names if where == group]
     return f"there are {', '.join(inside or dict.fromkeys(where for where, _, _ in names))}"
+
+
+def _of_plant_node(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the machine's groups where they stand as ROS 2 parameters of the plant node."""
+    for name in ("/**/plant_node", "plant_node"):
+        node = content.get(name)
+        if isinstance(node, dict) and isinstance(node.get("ros__parameters"), dict):
+            return dict(node["ros__parameters"])
+    return content
 
 
 def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:

@@ -10,43 +10,59 @@ linkage          measured stroke minus the linkage's stroke at the measured angl
 bending          measured minus modelled tip deflection under the measured force, rad
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs
-from emir_analysis.diagnosis.measured_state import Rates, follow
+from emir_analysis.diagnosis.experiment import (
+    ANGLE,
+    COMMAND,
+    COMMAND_STEP,
+    OUTPUTS,
+    STROKE,
+    Experiment,
+)
+from emir_analysis.diagnosis.free_run import ANGLE as ANGLE_COLUMN
+from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.signals import Array
 from emir_plant import linkage
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import resolver
 
-BALANCES = {
-    "force": "N",
-    "lifting_chamber": "m^3/s",
-    "lowering_chamber": "m^3/s",
-    "linkage": "m",
-    "bending": "rad",
-}
+H, S, DEFLECTION = "pressure_lifting", "pressure_lowering", "tip_deflection_angle"
 
+
+class Balance(NamedTuple):
+    """What a residual is measured in and which signals it takes beside the command."""
+
+    unit: str
+    signals: frozenset[str]
+
+
+BALANCES = {
+    "force": Balance("N", frozenset({ANGLE, H, S})),
+    "lifting_chamber": Balance("m^3/s", frozenset({ANGLE, H})),
+    "lowering_chamber": Balance("m^3/s", frozenset({ANGLE, S})),
+    "linkage": Balance("m", frozenset({ANGLE, STROKE})),
+    "bending": Balance("rad", frozenset({ANGLE, H, S, DEFLECTION})),
+}
+LINKAGE = list(BALANCES).index("linkage")
+
+READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted signals
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend
+LAG_SMOOTHING = 0.05  # s, of pressures and deflection where a sensor's lag is undone
+QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
 SUBSTEP = 2e-3  # s, of the states that no sensor shows: a tenth of the spool's period and less
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """time: (w,) s, middle of the windows. value: (w, 5) in the order of BALANCES, SI units."""
-
-    time: Array
-    value: Array
 
 
 class Balances:
@@ -59,12 +75,14 @@ class Balances:
     def __init__(self, experiment: Experiment, geometry: Machine) -> None:
         self._experiment = experiment
         period = experiment.period
-        samples = 2 * round(SMOOTHING / period / 2.0) + 1
-        self._angle = savgol_filter(experiment.angle, samples, 2)
-        rate = savgol_filter(experiment.angle, samples, 2, deriv=1, delta=period)
-        self._measured = np.column_stack([experiment.outputs[:, 1:3], self._angle, rate])
+        # a signal without a sensor is kept at the tank's pressure; what needs it is not told
+        shown = np.nan_to_num(experiment.outputs[:, 1:], nan=geometry.supply.pT)
+        self._shown = np.column_stack([experiment.angle, shown])
+        self._smooth_angle, self._rate = _smoothed(experiment.angle, SMOOTHING, period)
+        slopes = [_smoothed(column, LAG_SMOOTHING, period)[1] for column in shown.T]
+        self._slopes = np.column_stack([self._rate, *slopes])
         p = Plant(geometry).record[0]
-        arm = np.array([linkage.lever_arm(a, p) for a in self._angle])
+        arm = np.array([linkage.lever_arm(a, p) for a in self._smooth_angle])
         stroke = np.array([linkage.stroke(a, p) for a in experiment.angle])
         self._off_linkage = experiment.outputs[:, 0] - stroke
         self._flow_per_rate = np.column_stack(
@@ -75,11 +93,8 @@ class Balances:
         )
         # a force F turns the boom as a rigid body by phi_0^2 r F, phi_0 the rigid mode's shape
         self._force_per_turning = 1.0 / (p["mode_joint"][0] ** 2 * arm)
-        self.velocity = arm * rate
-        self.force = (
-            experiment.outputs[:, 1] * p["area_lifting"]
-            - experiment.outputs[:, 2] * p["area_lowering"]
-        )
+        self.velocity = arm * self._rate
+        self.force = shown[:, 0] * p["area_lifting"] - shown[:, 1] * p["area_lowering"]
         self._flow = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=1)
         self._turn = _Window(FORCE_WINDOW, FORCE_WINDOW, period, degree=2)
         self._mean = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=0)
@@ -89,64 +104,140 @@ class Balances:
         """Middle of the windows, (w,) s."""
         return self._mean(self._experiment.time)
 
-    def average(self, signal: Array) -> Array:
-        """Return a signal's mean over each window, (w,)."""
-        return self._mean(signal)
+    def signals(self) -> dict[str, tuple[str, Array]]:
+        """Return unit and mean over each window, (w,), of what a residual may depend on."""
+        experiment = self._experiment
+        command = np.append(experiment.commands, experiment.commands[-1])[:: experiment.every]
+        found = {
+            name: (unit, experiment.outputs[:, k])
+            for k, (name, unit) in enumerate(OUTPUTS.items())
+            if name in experiment.measured
+        }
+        found["piston_velocity"] = ("m/s", self.velocity)
+        if {H, S} <= experiment.measured:
+            found["piston_force"] = ("N", self.force)
+        found[COMMAND] = ("1", command)
+        found["time"] = ("s", experiment.time)
+        return {name: (unit, self._mean(signal)) for name, (unit, signal) in found.items()}
 
     def residuals(self, machines: Sequence[Machine]) -> Array:
         """Return what is missing in each balance, (m, w, 5), SI units.
 
         NaN for a machine that cannot rest at the recording's start.
         """
-        experiment = self._experiment
         plants = [Plant(machine) for machine in machines]
-        angle, pressure = experiment.start()
+        true = np.array([self._undistorted(plant.machine) for plant in plants])
         result = np.full((len(plants), self.time.size, len(BALANCES)), np.nan)
-        for k, rates in self._rates(plants, angle, pressure):
-            result[k] = self._missing(rates)
+        for k, modelled in self._modelled(plants, true):
+            result[k] = self._missing(modelled, true[k])
         return result
 
-    def _rates(
-        self, plants: Sequence[Plant], angle: float, pressure: float
-    ) -> list[tuple[int, Rates]]:
+    def one_step(self, machine: Machine) -> Array:
+        """Return measured minus predicted outputs, (n - 1, 4), SI units, one sample ahead.
+
+        From the measured state before, with what no sensor shows followed as for the balances.
+        The stroke goes on with the measured velocity, whatever the model.
+        """
+        result = np.full((self._experiment.angle.size - 1, len(OUTPUTS)), np.nan)
+        true = self._undistorted(machine)
+        for _, modelled in self._modelled([Plant(machine)], true[None], angle=SMOOTHED):
+            moved = self.velocity[:-1] * self._experiment.period
+            result[:, 0] = np.diff(self._experiment.outputs[:, 0]) - moved
+            result[:, 1] = np.diff(true[:, 1]) - np.diff(modelled.pressure_lifting)
+            result[:, 2] = np.diff(true[:, 2]) - np.diff(modelled.pressure_lowering)
+            result[:, 3] = (true[:, 3] - modelled.deflection)[1:]
+        result[:, np.isnan(self._experiment.outputs[0])] = np.nan
+        return result
+
+    def _undistorted(self, machine: Machine) -> Array:
+        """Return angle, p_H, p_S, deflection and the smoothed angle and rate, (n, 6).
+
+        What they truly were if the sensors distort them as the machine's effects say.
+        """
+        effects = machine.effects
+        columns, smooth = [], [self._smooth_angle, self._rate]
+        for k, name in enumerate(("angle", H, S, "deflection")):
+            lag = getattr(effects.sensor_delay, name)
+            bias, gain = getattr(effects.sensor_bias, name), getattr(effects.sensor_gain, name)
+            column = self._shown[:, k]
+            if lag > 0.0:
+                column = column + lag * self._slopes[:, k]
+            columns.append((column - bias) / (1.0 + gain))
+            if k == 0:
+                if lag > 0.0:
+                    smooth[0] = smooth[0] + lag * self._rate
+                    smooth[1] = smooth[1] + lag * np.gradient(self._rate, self._experiment.period)
+                smooth = [(smooth[0] - bias) / (1.0 + gain), smooth[1] / (1.0 + gain)]
+        return np.column_stack([*columns, *smooth])
+
+    def _modelled(
+        self, plants: Sequence[Plant], true: Array, angle: int = READ
+    ) -> list[tuple[int, Modelled]]:
+        experiment = self._experiment
         starts = {}
         for k, plant in enumerate(plants):
+            rest = true[k, : experiment.rest]
             try:
-                starts[k] = plant.initial(angle, pressure)
+                starts[k] = plant.initial(
+                    float(rest[:, 0].mean()), max(float(rest[:, 2].mean()), 0.0)
+                )
             except SimulationError:
                 continue
         if not starts:
             return []
-        records = np.concatenate([plants[k].record for k in starts])
-        every = self._experiment.every
+        able = list(starts)
         stride = max(
-            n for n in range(1, every + 1) if every % n == 0 and n * COMMAND_STEP <= SUBSTEP
+            n
+            for n in range(1, experiment.every + 1)
+            if experiment.every % n == 0 and n * COMMAND_STEP <= SUBSTEP
         )
         followed = follow(
             np.array(list(starts.values())),
-            self._experiment.commands[::stride],
+            experiment.commands[::stride],
             COMMAND_STEP * stride,
-            self._measured,
-            records,
+            np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
+            np.concatenate([plants[k].record for k in able]),
         )
-        return [(k, Rates(*columns)) for k, columns in zip(starts, followed, strict=True)]
+        return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
 
-    def _missing(self, rates: Rates) -> Array:
-        experiment = self._experiment
-        period = experiment.period
-        lifting = experiment.outputs[:, 1] - _integral(rates.pressure_lifting, period)
-        lowering = experiment.outputs[:, 2] - _integral(rates.pressure_lowering, period)
-        turning = experiment.angle - rates.bending
-        turning = turning - _integral(_integral(rates.turning, period), period)
+    def _missing(self, modelled: Modelled, true: Array) -> Array:
+        period = self._experiment.period
+        angle, lifting, lowering, deflection = true[:, :4].T
+        lifting = lifting - modelled.pressure_lifting
+        lowering = lowering - modelled.pressure_lowering
+        turning = angle - modelled.bending
+        turning = turning - _integral(modelled.turning, period)
         return np.column_stack(
             [
                 self._turn(turning) * self._mean(self._force_per_turning),
                 self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]),
                 self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]),
                 self._mean(self._off_linkage),
-                self._mean(experiment.outputs[:, 3] - rates.deflection),
+                self._mean(deflection - modelled.deflection),
             ]
         )
+
+
+def level(residual: Array) -> Array:
+    """Return the RMS of each column, (w, b) -> (b,), over the quieter 95 % of the windows.
+
+    In a few windows (a chamber at zero pressure, a logic block about to close) noise or a slight
+    error of a parameter makes far more than elsewhere; they would decide alone.
+    """
+    squares = np.sort(residual**2, axis=0)
+    return np.asarray(np.sqrt(np.mean(squares[: math.ceil(QUIETER * len(squares))], axis=0)))
+
+
+def available(measured: frozenset[str]) -> NDArray[np.bool_]:
+    """Tell which of BALANCES the measured signals allow, (5,)."""
+    return np.array([balance.signals <= measured for balance in BALANCES.values()])
+
+
+def _smoothed(signal: Array, length: float, period: float) -> tuple[Array, Array]:
+    """Return a signal smoothed by parabolas over a length, s, and its rate."""
+    samples = max(5, 2 * round(length / period / 2.0) + 1)
+    rate = savgol_filter(signal, samples, 2, deriv=1, delta=period)
+    return np.asarray(savgol_filter(signal, samples, 2)), np.asarray(rate)
 
 
 class _Window:
@@ -178,14 +269,14 @@ def _integral(rate: Array, period: float) -> Array:
 
 
 def noise_floor(experiment: Experiment, machine: Machine) -> Array:
-    """Return the RMS, (5,), that the sensors alone leave in each balance.
+    """Return the residuals, (w, 5), that the sensors alone leave in each balance.
 
     Found by simulating the machine under the recorded command, reading it through the sensors'
     noise and quantisation, and computing its balances with its own parameters.
     """
     ideal = free_runs([machine], experiment, [experiment.start()])[0]
-    residuals = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
-    return np.asarray(np.sqrt(np.mean(np.square(residuals), axis=0)))
+    left: Array = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
+    return left
 
 
 def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:
@@ -193,13 +284,11 @@ def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0
     sensors = machine.sensors
     p = Plant(machine).record[0]
     angle = np.array(
-        [resolver(a, sensors.resolver_bits, sensors.resolver_span) for a in ideal[:, ANGLE]]
+        [resolver(a, sensors.resolver_bits, sensors.resolver_span) for a in ideal[:, ANGLE_COLUMN]]
     )
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
     shown = np.column_stack(
         [np.array([linkage.stroke(a, p) for a in angle]), ideal[:, 2:] + noise * scale]
     )
-    return Experiment(
-        experiment.name, experiment.period, experiment.commands, angle, shown, experiment.rest
-    )
+    return experiment.showing(angle, shown)

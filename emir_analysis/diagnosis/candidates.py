@@ -1,38 +1,43 @@
-"""What is tried: the machine as it is, and with each effect of the registry.
+"""What is tried: the machine as it is, and with effects of the registry.
 
-Every trial is fitted twice on the part of a recording that the selection may see: on the
-balances, which is quick and finds its way from anywhere, and from there on the free run.
+Every trial is fitted twice: on the balances, which is quick and finds its way from anywhere,
+and from there on the free run.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES, Balances
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
-from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.fit import Problem, Solution, fit
+from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
-from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
-ACCURACY = 1e-4  # relative, of the free run
-LINKAGE = list(BALANCES).index("linkage")
-MOST_FITTED = 8  # effects of a shortlist, which are then fitted to the balances
-FELT = 1e-6  # share of an effect's shift that no parameter can imitate, and that is rounding
+ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
+ROUGH = 3e-2  # the same where only the way to the optimum is wanted
+HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
+HOPELESS_ACCURACY = 0.1  # relative
+FIRST = 0.25  # share of a recording on which a fit of the free run sets out
+SETTLING = 5.0  # s from the start in which the state at rest is found
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of effects with fitted parameters; spread: standard deviations, both (k,)."""
+    """A set of effects with fitted parameters.
+
+    x: (k,). covariance: (k, k) of x, from the curvature of the last fit; NaN before.
+    """
 
     effects: tuple[str, ...]
     unknowns: Unknowns
     x: Array
-    spread: Array
+    covariance: Array
 
     @property
     def name(self) -> str:
@@ -44,10 +49,19 @@ class Trial:
         """The machine with the fitted parameters."""
         return self.unknowns.at(self.x)
 
+    @property
+    def spread(self) -> Array:
+        """Standard deviations of x, (k,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def at(self, x: Array) -> "Trial":
+        """Return the trial with other parameters, (k,)."""
+        return Trial(self.effects, self.unknowns, x, self.covariance)
+
     def continued(self, solution: Solution) -> "Trial":
         """Return the trial with the parameters of a further fit."""
-        size = len(self.unknowns.members)
-        return Trial(self.effects, self.unknowns, solution.x[:size], solution.spread[:size])
+        k = len(self.unknowns.members)
+        return Trial(self.effects, self.unknowns, solution.x[:k], solution.covariance[:k, :k])
 
 
 def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) -> Trial:
@@ -55,82 +69,131 @@ def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) ->
     members = unknowns(sheet, effects)
     fitted = {} if known is None else dict(zip(known.unknowns.members, known.x, strict=True))
     x = np.array([fitted.get(unknown, unknown.start) for unknown in members.members])
-    return Trial(effects, members, x, np.full(x.size, np.nan))
+    return Trial(effects, members, x, np.full((x.size, x.size), np.nan))
 
 
-def shortlist(known: Trial, sheet: Sheet, balances: Balances, floor: Array) -> list[str]:
-    """Return the effects that could explain most of what a fitted trial leaves in the balances.
-
-    To first order: each effect at its trial value shifts the balances in a direction; what of it
-    no parameter can imitate takes away a share of the residual. Effects that are on already,
-    that cannot be simulated or that no balance feels are not in the list.
-    """
-    names = [name for name in REGISTRY if name not in known.effects]
-    fitted = known.unknowns.values(known.x)
-    machines = [known.machine, *(known.unknowns.at(x) for x in _neighbours(known))]
-    for name in names:
-        members = unknowns(sheet, (*known.effects, name))
-        machines.append(members.machine_with(members.values(members.start) | fitted))
-    speaking = np.arange(len(BALANCES)) != LINKAGE
-    missing = (balances.residuals(machines) / floor)[:, :, speaking].reshape(len(machines), -1)
-    shifts = missing[1:] - missing[0]
-    parameters, effects = shifts[: known.x.size], shifts[known.x.size :]
-    imitated, _ = np.linalg.qr(parameters.T)
-    left = missing[0] - imitated @ (imitated.T @ missing[0])
-    gains = {}
-    for name, shift in zip(names, effects, strict=True):
-        own = shift - imitated @ (imitated.T @ shift)
-        size = float(own @ own)
-        if np.isfinite(size) and size > FELT * float(shift @ shift):
-            gains[name] = float(own @ left) ** 2 / size
-    return sorted(gains, key=lambda name: -gains[name])[:MOST_FITTED]
-
-
-def _neighbours(trial: Trial) -> Array:
-    """Return the trial's vector with one entry changed a little in each row, (k, k)."""
-    _, high = trial.unknowns.bounds
-    return np.asarray(trial.x + np.diag(np.where(trial.x + STEP > high, -STEP, STEP)))
-
-
-def fit_balances(start: Trial, balances: Balances, floor: Array) -> Trial:
-    """Fit a trial to the balances of a recording. floor: (5,) what the sensors leave in each."""
-    speaking = np.arange(len(BALANCES)) != LINKAGE  # exact geometry: nothing to fit
+def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
+    """Fit a trial to the balances of recordings. floor: (5,) what the sensors leave in each."""
 
     def model(points: Array) -> Array:
-        missing = balances.residuals([start.unknowns.at(x) for x in points])
-        return np.asarray((missing / floor)[:, :, speaking].reshape(len(points), -1))
+        missing = evidence.residuals([start.unknowns.at(x) for x in points])
+        return np.asarray((missing / floor)[:, :, evidence.fitted].reshape(len(points), -1))
 
     low, high = start.unknowns.bounds
     problem = Problem(model, start.x, low, high, start.unknowns.toleranced)
     return start.continued(fit(problem, SCREENING_ACCURACY, robust=True))
 
 
-def fit_free_run(start: Trial, experiment: Experiment, noise: Array) -> Trial:
-    """Fit a trial to the free run of a recording. noise: (4,) of the outputs' sensors.
+def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial to the free run of recordings.
 
-    The initial angle within a resolver step and the initial p_S within what averaging leaves
-    are fitted along and then forgotten: they belong to the recording, not to the machine.
+    First to their beginning: over a short run parameters that are still off drift less, and it
+    costs less. A trial that cannot follow even that far is not polished. The state at rest at
+    each recording's start (see `Starts`) is fitted along and then forgotten: it belongs to the
+    recording, not to the machine.
     """
-    angle, pressure = experiment.start()
-    sensors = start.unknowns.machine.sensors
-    step = sensors.resolver_span / 2**sensors.resolver_bits
-    own = start.x.size
+    x = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
+    begun = _fit_free_run(start, evidence, FIRST, x, ROUGH)
+    accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
+    return start.continued(_fit_free_run(start, evidence, 1.0, begun.x, accuracy))
+
+
+def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial that was fitted to a part of the recordings' free run to the whole."""
+    x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
+    return known.continued(_fit_free_run(known, evidence, 1.0, x, ACCURACY))
+
+
+def _fit_free_run(
+    start: Trial, evidence: Evidence, share: float, x: Array, accuracy: float
+) -> Solution:
+    own, states = start.x.size, x.size - start.x.size
+    experiments = [e.head(share) for e in evidence.experiments]
+    starts = [Starts(e, evidence) for e in experiments]
 
     def model(points: Array) -> Array:
-        shown = free_runs(
-            [start.unknowns.at(x[:own]) for x in points],
-            experiment,
-            [(angle + x[own] * step, pressure + x[own + 1] * noise[2]) for x in points],
-        )
-        error = (shown[:, :, 1:] - experiment.outputs) / noise
-        return np.asarray(error.reshape(len(points), -1))
+        machines = [start.unknowns.at(x[:own]) for x in points]
+        parts = []
+        for k, (experiment, begin) in enumerate(zip(experiments, starts, strict=True)):
+            at = points[:, own + 2 * k : own + 2 * k + 2]
+            parts.append(_free_run_errors(machines, experiment, evidence, begin.at(at)))
+        return np.concatenate(parts, axis=1)
 
     low, high = start.unknowns.bounds
     problem = Problem(
         model,
-        np.append(start.x, [0.0, 0.0]),
-        np.append(low, [-0.5, -1.0]),
-        np.append(high, [0.5, 1.0]),
-        np.append(start.unknowns.toleranced, [False, False]),
+        x,
+        np.append(low, -np.ones(states)),
+        np.append(high, np.ones(states)),
+        np.append(start.unknowns.toleranced, np.zeros(states, dtype=bool)),
     )
-    return start.continued(fit(problem, ACCURACY))
+    return fit(problem, accuracy)
+
+
+class Starts:
+    """States of rest at the start of a recording that the sensors leave open.
+
+    Two numbers from -1 to 1: the angle within the resolver's step and p_S within its noise, or
+    within what the pump gives where no sensor shows it.
+    """
+
+    def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
+        sensors = evidence.stated.sensors
+        angle, pressure = experiment.start()
+        half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
+        half_range = sensors.pressure_noise
+        if np.isnan(pressure):
+            supply = evidence.stated.supply
+            pressure, half_range = 0.5 * (supply.pT + supply.p0), 0.5 * (supply.p0 - supply.pT)
+        self._middle = np.array([angle, pressure])
+        self._half = np.array([half_step, half_range])
+
+    def at(self, points: Array) -> list[tuple[float, float]]:
+        """Return angle, rad, and p_S, Pa, for (m, 2) numbers."""
+        return [(float(a), float(p)) for a, p in self._middle + self._half * points]
+
+
+def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
+    """Return the free run's outputs, (n, 4), SI units, from the state `at_rest`."""
+    start = at_rest(machine, experiment, evidence)
+    return free_runs([machine], experiment, [start])[0, :, ANGLE + 1 :]
+
+
+def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
+    """Return simulated minus measured in units of the noise, (n, outputs), for each recording."""
+    found = []
+    for experiment in evidence.experiments:
+        error = (free_run(machine, experiment, evidence) - experiment.outputs) / evidence.sensors
+        found.append(error[:, evidence.shown])
+    return found
+
+
+def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tuple[float, float]:
+    """Return the angle, rad, and p_S, Pa, from which a machine's free run starts.
+
+    Inside what the sensors leave open at rest, those with the least error over the first seconds;
+    the machine is left as it is.
+    """
+    early, starts = experiment.until(SETTLING), Starts(experiment, evidence)
+
+    def model(points: Array) -> Array:
+        machines = [machine] * len(points)
+        return _free_run_errors(machines, early, evidence, starts.at(points))
+
+    none = np.zeros(2, dtype=bool)
+    problem = Problem(model, np.zeros(2), -np.ones(2), np.ones(2), none)
+    if not np.all(np.isfinite(model(np.zeros((1, 2))))):
+        return starts.at(np.zeros((1, 2)))[0]
+    return starts.at(fit(problem, ACCURACY).x[None])[0]
+
+
+def _free_run_errors(
+    machines: Sequence[Machine],
+    experiment: Experiment,
+    evidence: Evidence,
+    starts: Sequence[tuple[float, float]],
+) -> Array:
+    """Return errors in units of the noise, one row for each machine."""
+    runs = free_runs(machines, experiment, starts)[:, :, ANGLE + 1 :]
+    error = (runs - experiment.outputs)[:, :, evidence.shown] / evidence.sensors[evidence.shown]
+    return np.asarray(error.reshape(len(machines), -1))

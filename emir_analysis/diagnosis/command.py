@@ -1,50 +1,85 @@
 """The diagnosis of recordings in files, as the `emir diagnose` command calls it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from emir_analysis.diagnosis.control import before_and_after
 from emir_analysis.diagnosis.diagnose import Progress, diagnose
 from emir_analysis.diagnosis.experiment import open_experiment
+from emir_analysis.diagnosis.judged import judged
+from emir_analysis.diagnosis.model_file import write_model
 from emir_analysis.diagnosis.page import write_page
+from emir_analysis.diagnosis.predictions import check_folder, write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
 from emir_analysis.errors import InputError
 from emir_analysis.signals import read_signal_map
 from emir_plant.sheet import load_sheet
 
+Bags = Path | Sequence[Path]
+
 
 def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
-    bag: Path,
+    bag: Bags,
     datasheet: Path,
     signals: Path,
-    judge: Path | None,
+    judge: Bags | None,
     json: Path | None,
     html: Path | None,
     progress: Progress,
+    *,
+    model_out: Path | None = None,
+    predictions: Path | None = None,
 ) -> Diagnosis:
-    """Find out from the recording `bag` what the data sheet's machine lacks.
+    """Find out from the recordings `bag` what the data sheet's machine lacks.
 
-    signals: YAML map from signals to topics. judge: recording on which the errors are stated,
+    signals: YAML map from signals to topics. judge: recordings on which the errors are stated,
     opened when everything is fitted; `bag` itself when not given. json, html: files to write.
-    Raises InputError or ParameterError, one line each, for anything that cannot be used.
+    model_out: file for the machine as found; a controller designed before and after is then
+    compared on it. predictions: folder for the simulated runs. Raises InputError or
+    ParameterError, one line each, for anything that cannot be used.
     """
-    for file in (json, html):
-        if file is not None and not file.parent.is_dir():
-            raise InputError(f"{file}: no such folder {file.parent}")
+    _check_outputs([json, html, model_out], predictions)
     sheet = load_sheet(datasheet)
     if not sheet.tolerances:
         raise InputError(f"{datasheet}: no parameter has a tolerance, nothing to fit")
-    if judge is not None and not judge.exists():
-        raise InputError(f"{judge}: no such recording")
+    judges = _several(judge)
+    missing = [path for path in judges if not path.exists()]
+    if missing:
+        raise InputError(f"{missing[0]}: no such recording")
     signal_map = read_signal_map(signals)
-    progress(f"reading {bag}")
-    experiment = open_experiment(bag, signal_map, sheet.machine)
-    findings = diagnose(experiment, sheet, progress)
-    judged = experiment
-    if judge is not None:
-        progress(f"judging on {judge}")
-        judged = open_experiment(judge, signal_map, sheet.machine)
-    result = diagnosis(findings, judged)
+    experiments = []
+    for path in _several(bag):
+        progress(f"reading {path}")
+        experiments.append(open_experiment(path, signal_map, sheet.machine))
+    findings = diagnose(experiments, sheet, progress)
+    progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
+    opened = [open_experiment(path, signal_map, sheet.machine) for path in judges]
+    judgement = judged(findings, opened or experiments)
+    control = None
+    if model_out is not None:
+        progress("designing a controller before and after")
+        control = before_and_after(sheet.machine, findings.chosen.machine)
+    result = diagnosis(findings, judgement, control)
     if json is not None:
         write_json(json, result)
+    if model_out is not None:
+        write_model(model_out, findings.chosen.machine, result.recording)
+    if predictions is not None:
+        write_predictions(predictions, judgement)
     if html is not None:
-        write_page(html, findings, result, judged)
+        write_page(html, findings, result, judgement)
     return result
+
+
+def _check_outputs(files: Sequence[Path | None], folder: Path | None) -> None:
+    for file in files:
+        if file is not None and not file.parent.is_dir():
+            raise InputError(f"{file}: no such folder {file.parent}")
+    if folder is not None:
+        check_folder(folder)
+
+
+def _several(paths: Bags | None) -> list[Path]:
+    if paths is None:
+        return []
+    return [paths] if isinstance(paths, Path) else list(paths)

@@ -1,29 +1,30 @@
-"""The course of a diagnosis: balances, parameters, effects, verdict - from one recording."""
+"""The course of a diagnosis: balances, parameters, effects, verdict - from recordings."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES, Balances, noise_floor
+from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import (
-    LINKAGE,
     Trial,
     fit_balances,
     fit_free_run,
-    shortlist,
+    free_run_errors,
+    refine_free_run,
     trial,
 )
-from emir_analysis.diagnosis.experiment import COMMAND, OUTPUTS, Experiment, noise
-from emir_analysis.diagnosis.free_run import errors, rms
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.diagnosis.screening import screen
 from emir_analysis.diagnosis.select import (
-    EXPLAINED,
     SEEN,
     SPEAKS,
     STRONG,
     balance_score,
+    explained,
     free_run_score,
-    named,
     quiet,
     rivals,
 )
@@ -33,7 +34,9 @@ from emir_plant.sheet import Sheet
 
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 MOST_EFFECTS = 2  # that are looked for in one machine
+MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
+CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
 Progress = Callable[[str], None]
 
@@ -52,17 +55,17 @@ class Tried:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a recording says about the machine.
+    """What recordings say about the machine.
 
     verdict: nothing_missing, found, ambiguous or unexplained. refitted: parameters only, chosen:
-    with the effects named, both fitted to the whole recording. rejected: effects that were best
+    with the effects named, both fitted to the whole recordings. rejected: effects that were best
     among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
     `after`; floor: (5,) the sensors' share. speaking: the loudest balance that is not down to
     the noise at the end, shape: of its residual.
     """
 
-    experiment: Experiment
+    evidence: Evidence
     sheet: Sheet
     verdict: str
     refitted: Trial
@@ -70,128 +73,117 @@ class Findings:
     rejected: tuple[str, ...]
     tried: tuple[Tried, ...]
     rivals: tuple[Trial, ...]
-    balances: Balances
     residuals: dict[str, Array]
     floor: Array
     speaking: str | None
     shape: Shape | None
 
 
-def diagnose(experiment: Experiment, sheet: Sheet, progress: Progress) -> Findings:
-    """Find out from one recording what the data sheet's machine lacks."""
-    sensors = noise(sheet.machine)
-    balances = Balances(experiment, sheet.machine)
-    floor = _floor(experiment, trial(sheet, ()), sensors)
-    tried, best = _search(experiment, sheet, balances, floor, progress)
-    chosen = best[0]
+def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
+    """Find out from recordings of one machine what its data sheet lacks."""
+    evidence = Evidence(experiments, sheet.machine)
+    search = _Search(evidence, sheet, progress)
+    best = search.run()
+    chosen, refitted = best[0], search.refitted
     progress("fitting to the whole recording")
-    parameters_only = tried[0]
-    plain = fit_balances(parameters_only.trial, balances, floor)
-    simulated = parameters_only.free_run is not None
-    refitted = fit_free_run(parameters_only.trial if simulated else plain, experiment, sensors)
-    balanced, final = plain, refitted
-    if chosen.effects:
-        balanced = fit_balances(chosen, balances, floor)
-        final = fit_free_run(chosen, experiment, sensors)
-    machines = [sheet.machine, plain.machine, balanced.machine]
-    before, unaided, after = balances.residuals(machines)
-    floor = _floor(experiment, final, sensors)
-    free_run = rms(errors(final.machine, experiment)) / sensors
-    convincing = _convincing(final, unaided, after, floor, free_run)
-    verdict = _verdict(final, len(best) - 1, convincing=convincing)
+    final = refine_free_run(chosen, evidence) if chosen.effects else refitted
+    machines = [sheet.machine, search.balanced.machine]
+    before, unaided = evidence.residuals(machines)
+    after = unaided
+    if final.effects:
+        after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
+    floor = evidence.floor(final.machine)
+    good = quiet(level(after), floor) and explained(free_run_errors(final.machine, evidence))
+    verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "unexplained":
         final, after = refitted, unaided
-        floor = _floor(experiment, final, sensors)
+        floor = evidence.floor(final.machine)
     speaking = loudest(after, floor)
     return Findings(
-        experiment=experiment,
+        evidence=evidence,
         sheet=sheet,
         verdict=verdict,
         refitted=refitted,
         chosen=final,
         rejected=chosen.effects if verdict == "unexplained" else (),
-        tried=tuple(tried),
+        tried=tuple(search.tried),
         rivals=tuple(best[1:]),
-        balances=balances,
         residuals={"before": before, "refitted": unaided, "after": after},
         floor=floor,
         speaking=speaking,
-        shape=None if speaking is None else _shape(experiment, balances, after, speaking),
+        shape=None if speaking is None else _shape(evidence, after, speaking),
     )
 
 
-def _search(
-    experiment: Experiment, sheet: Sheet, balances: Balances, floor: Array, progress: Progress
-) -> tuple[list[Tried], list[Trial]]:
-    """Return all that was tried and the best trials, on the part that the selection may see.
+class _Search:
+    """Forward selection: effects are added one at a time, as long as the unseen part gets better.
 
-    Forward selection: effects are added one at a time, as long as the unseen part gets better.
+    tried: all trials. balanced, refitted: the parameters alone, fitted to the balances and to the
+    free run of the whole recordings.
     """
-    sensors = noise(sheet.machine)
-    head = experiment.head(SEEN)
-    seen = Balances(head, sheet.machine)
 
-    def simulated(screened: Tried) -> Tried:
-        progress(f"free run: {screened.trial.name}")
-        fitted = fit_free_run(screened.trial, head, sensors)
-        return Tried(fitted, screened.balances, free_run_score(fitted, experiment, sensors))
+    def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
+        self._evidence, self._sheet, self._progress = evidence, sheet, progress
+        self._head = evidence.head(SEEN)
+        self.floor = evidence.floor(sheet.machine)
+        progress("parameters only")
+        self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
+        self.refitted = fit_free_run(self.balanced, evidence)
+        self.tried: list[Tried] = []
 
-    def screened(effects: tuple[str, ...], known: Trial | None) -> Tried:
-        start = trial(sheet, effects, known)
-        progress(f"balances: {start.name}")
-        fitted = fit_balances(start, seen, floor)
-        return Tried(fitted, balance_score(fitted, balances, floor))
+    def run(self) -> list[Trial]:
+        """Return the best trial and those that are as good."""
+        errors = free_run_errors(self.refitted.machine, self._evidence)
+        at_noise = rms(np.concatenate(errors)) <= AT_NOISE
+        if np.all(at_noise) and quiet(self._left(self.balanced), self.floor):
+            self.tried = [self._scored(self.balanced)]
+            return [self.refitted]  # nothing is left that an effect could explain
+        plain = fit_balances(self.balanced, self._head, self.floor)
+        best = self._scored(plain, free_run_score(self.refitted, self._evidence))
+        self.tried, equal = [best], [best.trial]
+        while len(best.trial.effects) < MOST_EFFECTS:
+            simulated = self._round(best)
+            better = [t for t in simulated if _free(t) < _free(best) - STRONG]
+            if not better:
+                break
+            equal = rivals([t.trial for t in better], [_free(t) for t in better])
+            best = min(better, key=_free)
+            floor = self._evidence.floor(best.trial.machine)
+            if quiet(self._left(best.trial), floor) and explained(
+                free_run_errors(best.trial.machine, self._evidence)
+            ):
+                break
+        return equal
 
-    best = screened((), None)
-    if quiet(rms(balances.residuals([best.trial.machine])[0]), floor):
-        best = simulated(best)
-        if np.all(rms(errors(best.trial.machine, experiment)) <= AT_NOISE * sensors):
-            return [best], [best.trial]  # nothing is left that an effect could explain
-    tried = [best]
-    equal = [best.trial]
-    while len(best.trial.effects) < MOST_EFFECTS:
-        known = best.trial if best.trial.effects else None
-        progress(f"shortlist beside: {best.trial.name}")
-        others = shortlist(best.trial, sheet, seen, floor)
-        round_ = [screened((*best.trial.effects, name), known) for name in others]
-        promising = sorted(
-            (t for t in round_ if t.balances < best.balances - STRONG), key=lambda t: t.balances
-        )[:MOST_SIMULATED]
-        if promising and best.free_run is None:
-            best = simulated(best)
-            tried[0] = best
-        runs = {t.trial.name: simulated(t) for t in promising}
-        tried += [runs.get(t.trial.name, t) for t in round_]
-        better = [t for t in runs.values() if _free(t) < _free(best) - STRONG]
-        if not better:
-            break
-        equal = rivals([t.trial for t in better], [_free(t) for t in better])
-        best = min(better, key=_free)
-        residuals = balances.residuals([best.trial.machine])[0]
-        if quiet(rms(residuals), _floor(experiment, best.trial, sensors)):
-            break
-    return tried, equal
+    def _round(self, best: Tried) -> list[Tried]:
+        """Try one effect more beside the best trial; return those that went on to the free run."""
+        self._progress(f"all effects beside: {best.trial.name}")
+        found = screen(best.trial, self._sheet, self._head, self.floor)
+        round_ = []
+        for screened in found[:MOST_FITTED]:
+            self._progress(f"balances: {screened.trial.name}")
+            round_.append(self._scored(fit_balances(screened.trial, self._head, self.floor)))
+        least = min((t.balances for t in round_), default=np.inf)
+        limit = min(best.balances - STRONG, least + CLOSE)
+        close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
+        promising = close[:MOST_SIMULATED]
+        simulated = []
+        for tried in promising:
+            self._progress(f"free run: {tried.trial.name}")
+            fitted = fit_free_run(tried.trial, self._head)
+            simulated.append(Tried(fitted, tried.balances, free_run_score(fitted, self._evidence)))
+        self.tried += simulated + [t for t in round_ if t not in promising]
+        return simulated
+
+    def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
+        return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
+
+    def _left(self, tried: Trial) -> Array:
+        return level(self._evidence.residuals([tried.machine])[0])
 
 
 def _free(tried: Tried) -> float:
     return float("inf") if tried.free_run is None else tried.free_run
-
-
-def _floor(experiment: Experiment, fitted: Trial, sensors: Array) -> Array:
-    floor = noise_floor(experiment, fitted.machine)
-    floor[LINKAGE] = sensors[0]
-    return floor
-
-
-def _convincing(final: Trial, unaided: Array, after: Array, floor: Array, free_run: Array) -> bool:
-    """Tell whether a trial says enough of what the recording shows.
-
-    unaided, after: residuals (w, 5) without and with its effects. free_run: (4,) RMS errors in
-    units of the sensors' noise.
-    """
-    if final.effects:
-        return named(rms(unaided), rms(after), floor)
-    return quiet(rms(after), floor) and bool(np.all(free_run <= EXPLAINED))
 
 
 def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:
@@ -207,22 +199,13 @@ def loudest(residual: Array, floor: Array) -> str | None:
 
     A missing force bends the boom too, so the bending counts only where nothing else speaks.
     """
-    loudness = dict(zip(BALANCES, rms(residual) / floor, strict=True))
+    loudness = dict(zip(BALANCES, level(residual) / floor, strict=True))
     loud = [name for name, ratio in loudness.items() if ratio > SPEAKS]
     first = [name for name in loud if name != "bending"]
     return max(first or loud, key=loudness.__getitem__, default=None)
 
 
-def _shape(experiment: Experiment, balances: Balances, residual: Array, speaking: str) -> Shape:
-    every = experiment.every
-    command = np.append(experiment.commands, experiment.commands[-1])[::every]
-    signals = {
-        name: (unit, balances.average(experiment.outputs[:, k]))
-        for k, (name, unit) in enumerate(OUTPUTS.items())
-    }
-    signals["piston_velocity"] = ("m/s", balances.average(balances.velocity))
-    signals["piston_force"] = ("N", balances.average(balances.force))
-    signals[COMMAND] = ("1", balances.average(command))
-    signals["time"] = ("s", balances.time)
+def _shape(evidence: Evidence, residual: Array, speaking: str) -> Shape:
+    signals = evidence.signals()
     column = list(BALANCES).index(speaking)
     return best_shape(residual[:, column], signals["piston_velocity"][1], signals)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from emir_analysis.diagnosis.recording_checks import check_motion, check_sampling, check_values
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Recording, Signal, SignalMap, load
 from emir_plant import linkage
@@ -14,20 +15,19 @@ from emir_plant.record import record
 
 COMMAND = "valve_command"
 ANGLE = "joint_angle"
+STROKE = "piston_stroke"
 OUTPUTS = {  # what a free run is compared with, in this order, and its unit
-    "piston_stroke": "m",
+    STROKE: "m",
     "pressure_lifting": "Pa",
     "pressure_lowering": "Pa",
     "tip_deflection_angle": "rad",
 }
-NEEDED = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS
+SIGNALS = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS
 
 COMMAND_STEP = 1e-3  # s, the grid on which the held command is kept
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
-LARGEST_GAP = 0.2  # s without a sample: the slow mode is still followed by interpolation
 REST = 0.2  # s at the start from which the initial pressure is averaged
 SHORTEST_REST = 0.1  # s
-LEAST_MOTION = 20  # resolver steps of travel below which nothing can be told from a recording
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,9 @@ class Experiment:
     """One recording on a common time grid, from rest.
 
     period: s, between samples. commands: (k,) y2 every COMMAND_STEP. angle: (n,) rad.
-    outputs: (n, 4) in the order of OUTPUTS, SI units. rest: samples at rest at the start.
+    outputs: (n, 4) in the order of OUTPUTS, SI units, NaN where there is no sensor. rest: samples
+    at rest at the start. measured: names of the signals that sensors show; an angle that none
+    shows is the stroke's.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Experiment:
     angle: Array
     outputs: Array
     rest: int
+    measured: frozenset[str] = frozenset({ANGLE, *OUTPUTS})
 
     @property
     def time(self) -> Array:
@@ -57,7 +60,11 @@ class Experiment:
 
     def head(self, share: float) -> "Experiment":
         """Return the first part of the recording."""
-        samples = int(share * (self.angle.size - 1)) + 1
+        return self.until(share * self.period * (self.angle.size - 1))
+
+    def until(self, time: float) -> "Experiment":
+        """Return the recording up to a time, s."""
+        samples = min(int(time / self.period + 1e-6) + 1, self.angle.size)
         return replace(
             self,
             commands=self.commands[: (samples - 1) * self.every],
@@ -65,47 +72,82 @@ class Experiment:
             outputs=self.outputs[:samples],
         )
 
+    def showing(self, angle: Array, outputs: Array) -> "Experiment":
+        """Return the recording with other readings of the same sensors."""
+        blind = np.array([name not in self.measured for name in OUTPUTS])
+        return replace(self, angle=angle, outputs=np.where(blind, np.nan, outputs))
+
+    def under(self, commands: Array) -> "Experiment":
+        """Return a run from the same rest under other commands, (k,), without readings."""
+        samples = commands.size // self.every + 1
+        return replace(
+            self,
+            commands=commands[: (samples - 1) * self.every],
+            angle=np.full(samples, self.angle[: self.rest].mean()),
+            outputs=np.tile(self.outputs[: self.rest].mean(axis=0), (samples, 1)),
+        )
+
     def start(self) -> tuple[float, float]:
-        """Return angle, rad, and p_S, Pa, at rest: the means of the first samples."""
+        """Return angle, rad, and p_S, Pa, at rest: the means of the first samples.
+
+        p_S is NaN where no sensor shows it.
+        """
         return float(self.angle[: self.rest].mean()), float(self.outputs[: self.rest, 2].mean())
 
 
 def open_experiment(path: Path, signal_map: SignalMap, machine: Machine) -> Experiment:
     """Load a recording for the diagnosis.
 
-    Raises InputError for a missing signal, another unit, gaps, a recording that is too short,
-    does not start at rest or never moves; the message says what to record instead.
+    A sensor that the signal map leaves out is done without. Raises InputError for a missing
+    command, a missing angle and stroke, another unit, gaps, a recording that is too short, does
+    not start at rest or never moves; the message says what to record instead.
     """
-    for name, unit in NEEDED.items():
-        if name not in signal_map:
-            raise InputError(f"the signal map has no {name}, which the diagnosis needs")
-        if signal_map[name][2] != unit:
-            raise InputError(f"the signal map has {name} in {signal_map[name][2]}, expected {unit}")
-    recording = load(path, {name: signal_map[name] for name in NEEDED})
-    return experiment(str(path), recording, machine)
+    if COMMAND not in signal_map:
+        raise InputError(f"the signal map has no {COMMAND}, without which nothing can be told")
+    if not {ANGLE, STROKE} & set(signal_map):
+        raise InputError(f"the signal map has neither {ANGLE} nor {STROKE}; one is needed")
+    mapped = {name: signal_map[name] for name in SIGNALS if name in signal_map}
+    for name, source in mapped.items():
+        if source[2] != SIGNALS[name]:
+            raise InputError(f"the signal map has {name} in {source[2]}, expected {SIGNALS[name]}")
+    return experiment(str(path), load(path, mapped), machine)
 
 
 def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     """Bring a recording's signals on one grid. Raises InputError as `open_experiment`."""
-    sensors = [recording[signal] for signal in (ANGLE, *OUTPUTS)]
-    for signal in sensors:
-        _check_sampling(name, signal)
-    begin = max(signal.time[0] for signal in sensors)
-    end = min(signal.time[-1] for signal in sensors)
+    sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
+    for signal in sensors.values():
+        check_sampling(name, signal)
+    begin = max(signal.time[0] for signal in sensors.values())
+    end = min(signal.time[-1] for signal in sensors.values())
     if end - begin < SHORTEST:
         raise InputError(
             f"{name}: {max(end - begin, 0.0):.1f} s that all signals share;"
             f" record at least {SHORTEST:.0f} s"
         )
-    every = max(1, round(float(np.median(np.diff(sensors[0].time))) / COMMAND_STEP))
+    first = next(iter(sensors.values()))
+    every = max(1, round(float(np.median(np.diff(first.time))) / COMMAND_STEP))
     period = every * COMMAND_STEP
     # one microsecond of slack against stamps that were rounded
     time = begin + np.arange(int((end - begin + 1e-6) / period) + 1) * period
-    angle, *outputs = (np.interp(time, signal.time, signal.value) for signal in sensors)
+    shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
     commands = _held(recording[COMMAND], begin, every * (time.size - 1))
     rest = _rest(name, commands, period, machine)
-    _check_motion(name, angle, machine)
-    return Experiment(name, period, commands, angle, np.stack(outputs, axis=1), rest)
+    angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)
+    check_motion(name, angle, machine)
+    check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
+    unknown = np.full(time.size, np.nan)
+    outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
+    measured = frozenset(shown) | {ANGLE}
+    return Experiment(name, period, commands, angle, outputs, rest, measured)
+
+
+def _angles(stroke: Array, machine: Machine) -> Array:
+    """Return the boom angles, (n,) rad, of strokes, (n,) m."""
+    p = record(machine)[0]
+    angle = np.linspace(0.0, math.pi, 2000) - p["triangle_gamma0"]
+    strokes = np.array([linkage.stroke(a, p) for a in angle])
+    return np.asarray(np.interp(stroke, strokes, angle))
 
 
 def noise(machine: Machine) -> Array:
@@ -134,30 +176,13 @@ def _held(command: Signal, begin: float, count: int) -> Array:
     return np.clip(command.value[np.maximum(latest, 0)], -1.0, 1.0)
 
 
-def _check_sampling(name: str, signal: Signal) -> None:
-    gaps = np.diff(signal.time)
-    widest = int(np.argmax(gaps))
-    if gaps[widest] > LARGEST_GAP:
-        raise InputError(
-            f"{name}: {signal.name} has a gap of {gaps[widest]:.2f} s"
-            f" at {signal.time[widest]:.2f} s; record without gaps"
-        )
-
-
 def _rest(name: str, commands: Array, period: float, machine: Machine) -> int:
     moving = np.flatnonzero(np.abs(commands) > machine.valve.dead_zone)
     if moving.size == 0:
-        raise InputError(f"{name}: the valve command never leaves the dead zone; nothing moves")
+        raise InputError(
+            f"{name}: the valve command never leaves the dead zone; record moves up and down"
+        )
     rest = moving[0] * COMMAND_STEP
     if rest < SHORTEST_REST:
         raise InputError(f"{name}: starts moving at {rest:.2f} s; record a second at rest before")
     return max(1, int(min(rest, REST) / period))
-
-
-def _check_motion(name: str, angle: Array, machine: Machine) -> None:
-    step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
-    if np.ptp(angle) < LEAST_MOTION * step:
-        raise InputError(
-            f"{name}: never moves (the angle stays within {np.ptp(angle):.2g} rad);"
-            " record moves up and down over some degrees"
-        )

@@ -33,10 +33,11 @@ class Problem:
 
 @dataclass(frozen=True)
 class Solution:
-    """x: (k,). spread: (k,) standard deviations from the curvature at the optimum."""
+    """x: (k,). covariance: (k, k) from the curvature at the optimum. misfit: RMS residual."""
 
     x: Array
-    spread: Array
+    covariance: Array
+    misfit: float
 
 
 def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
@@ -74,4 +75,6 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     inverse = np.linalg.pinv(curvature.T @ curvature)
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
-    return Solution(np.asarray(result.x), np.sqrt(np.diag(inverse) * excess))
+    return Solution(
+        np.asarray(result.x), inverse * excess, math.sqrt(2.0 * result.cost / result.fun.size)
+    )

@@ -51,16 +51,6 @@ def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | No
         return None
 
 
-def free_run(machine: Machine, experiment: Experiment) -> Array:
-    """Return the outputs, (n, 4), of one machine from the recording's own first samples."""
-    return free_runs([machine], experiment, [experiment.start()])[0, :, ANGLE + 1 :]
-
-
-def errors(machine: Machine, experiment: Experiment) -> Array:
-    """Return simulated minus measured outputs, (n, 4), SI units."""
-    return free_run(machine, experiment) - experiment.outputs
-
-
 def rms(error: Array) -> Array:
     """Return the root mean square of each column."""
     return np.asarray(np.sqrt(np.mean(np.square(error), axis=0)))

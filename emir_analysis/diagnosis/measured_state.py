@@ -1,5 +1,10 @@
 """The model's rates along a recording: its state is the measured one wherever a sensor shows it.
 
+They are integrated together with the states that no sensor shows, in steps that follow the spool:
+between two samples the valve's flow changes too fast for the trapezoidal rule. The boom's rate,
+which friction depends on, has to be smoothed; what the piston sweeps is taken from the angle as
+it was read, since smoothing would take some of the slow mode away.
+
 Pressures, boom angle and its rate are taken from the recording. What no sensor shows is
 simulated from what the sensors do show: the spool from the command, the logic block from
 p_H, the bending modes from the measured force. So an error in one balance cannot leak into
@@ -14,16 +19,17 @@ from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
 from emir_plant import core
-from emir_plant.effects import command_delay
+from emir_plant.effects import command_delay, linkage_error, terms
+from emir_plant.hydraulics import chambers
 from emir_plant.jit import compiled, compiled_parallel
 
 
-class Rates(NamedTuple):
+class Modelled(NamedTuple):
     """What the model says along the recording, each (m, n) for m machines and n samples."""
 
-    pressure_lifting: Array  # dp_H/dt, Pa/s
-    pressure_lowering: Array  # dp_S/dt, Pa/s
-    turning: Array  # d^2/dt^2 of the boom's rigid rotation, rad/s^2
+    pressure_lifting: Array  # integral of dp_H/dt since the start, Pa
+    pressure_lowering: Array  # integral of dp_S/dt since the start, Pa
+    turning: Array  # change of the rate of the boom's rigid rotation since the start, rad/s
     bending: Array  # boom angle minus rigid rotation, rad
     deflection: Array  # alpha_6 - alpha_1, rad
 
@@ -34,7 +40,7 @@ def _write_rates(
 ) -> None:
     """Put the measured values into the state x and write its rates to dx.
 
-    measured: (4,) p_H, p_S, Pa, boom angle, rad, and its rate, rad/s.
+    measured: (5,) p_H, p_S, Pa, boom angle, rad, its rate, rad/s, and one that is not used here.
     """
     p = parameters[0]
     n = p.mode_joint.size
@@ -52,7 +58,7 @@ def _write_rates(
 def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
     x: Array, command: float, dt: float, measured: Array, parameters: NDArray[Any], work: Array
 ) -> None:
-    """Advance x by dt, s, with RK4. measured: (3, 4) at start, middle and end of the step."""
+    """Advance x by dt, s, with RK4. measured: (3, 5) at start, middle and end of the step."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
     _write_rates(x, command, measured[0], parameters, k1)
     for i in range(x.size):
@@ -69,21 +75,41 @@ def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them
 
 
 @compiled
+def _swept(turned: float, measured: Array, p: Any) -> tuple[float, float]:
+    """Return the changes of p_H and p_S, Pa, that a small turn of the boom, rad, makes."""
+    stroke = linkage_error.stroke(measured[2], p)
+    moved = linkage_error.lever_arm(measured[2], p) * turned
+    volume = chambers.volume_lifting(stroke, p)
+    stiffness = terms.stiffness(measured[0], volume, p.vessel_compliance_lifting, p)
+    lifting = chambers.pressure_rate(-p.area_lifting * moved, volume, measured[0], stiffness)
+    volume = chambers.volume_lowering(stroke, p)
+    stiffness = terms.stiffness(measured[1], volume, p.vessel_compliance_lowering, p)
+    lowering = chambers.pressure_rate(p.area_lowering * moved, volume, measured[1], stiffness)
+    return lifting, lowering
+
+
+@compiled
+def _mean_rate(work: Array, i: int) -> float:
+    """Return the mean rate of a state over the last step."""
+    total: float = work[0, i] + 2.0 * (work[1, i] + work[2, i]) + work[3, i]
+    return total / 6.0
+
+
+@compiled
 def _follow(
     start: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
 ) -> Array:
-    """Return (5, n), the columns of Rates along measured (n, 4); steps of dt, s."""
+    """Return (5, n), the columns of Modelled along measured (n, 5); steps of dt, s."""
     p = parameters[0]
     samples, n = measured.shape[0], p.mode_joint.size
     every = commands.size // (samples - 1)
     arriving = command_delay.delayed(commands, dt, parameters)
-    x, dx, work = start.copy(), np.zeros(start.size), np.zeros((5, start.size))
+    x, work = start.copy(), np.zeros((5, start.size))
     at = np.empty((3, measured.shape[1]))
     result = np.zeros((5, samples))
+    lifting, lowering, turning = 0.0, 0.0, 0.0
     for k in range(samples):
-        _write_rates(x, arriving[min(k * every, commands.size - 1)], measured[k], parameters, dx)
-        result[0, k], result[1, k] = dx[core.P_H], dx[core.P_S]
-        result[2, k] = p.mode_joint[0] * dx[core.MODES + n]
+        result[0, k], result[1, k], result[2, k] = lifting, lowering, turning
         for i in range(1, n):
             bent = x[core.MODES + i]
             result[3, k] += p.mode_joint[i] * bent
@@ -96,6 +122,13 @@ def _follow(
             at[1] = at[0] + 0.5 * slope
             at[2] = at[0] + slope
             _step(x, arriving[k * every + j], dt, at, parameters, work)
+            left_out = (measured[k + 1, 4] - measured[k, 4]) / every - dt * at[1, 3]
+            swept_lifting, swept_lowering = _swept(left_out, at[1], p)
+            lifting += swept_lifting
+            lowering += swept_lowering
+            lifting += dt * _mean_rate(work, core.P_H)
+            lowering += dt * _mean_rate(work, core.P_S)
+            turning += dt * p.mode_joint[0] * _mean_rate(work, core.MODES + n)
     return result
 
 
@@ -103,13 +136,14 @@ def _follow(
 def follow(
     starts: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
 ) -> Array:
-    """Return (m, 5, n), the columns of Rates, of m machines along one recording.
+    """Return (m, 5, n), the columns of Modelled, of m machines along one recording.
 
     starts: (m, s) states. commands: (k,) y2, each held for dt, s; k a multiple of n - 1.
-    measured: (n, 4) p_H, p_S, Pa, boom angle, rad, its rate, rad/s. parameters: (m,) records.
+    measured: (m, n, 5) p_H, p_S, Pa, smoothed boom angle, rad, its rate, rad/s, and the angle as
+    it was read, rad, as each machine's sensors mean them. parameters: (m,) records.
     """
     machines = parameters.size
-    result = np.empty((machines, 5, measured.shape[0]))
+    result = np.empty((machines, 5, measured.shape[1]))
     for m in numba.prange(machines):
-        result[m] = _follow(starts[m], commands, dt, measured, parameters[m : m + 1])
+        result[m] = _follow(starts[m], commands, dt, measured[m], parameters[m : m + 1])
     return result

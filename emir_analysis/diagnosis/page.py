@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
     SHOWN,
     balances_picture,
@@ -23,15 +23,18 @@ VERDICTS = {
 }
 
 
-def write_page(path: Path, findings: Findings, result: Diagnosis, judge: Experiment) -> None:
+def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged) -> None:
     """Write the report as HTML. Raises InputError when the file cannot be written."""
     blocks: list[Block] = [
         Text(f"{VERDICTS[result.verdict]}: {result.statement}.", lead=True),
+        *[Text(line) for line in (result.tell_apart, *result.untold.values()) if line],
         *_effects(result.effects),
-        *_free_runs(findings, result, judge),
+        *_free_runs(findings, result, judged),
         *_balances(findings, result),
         *_candidates(result),
         *_parameters(findings, result),
+        *_errors(result),
+        *_control(result),
     ]
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
 
@@ -47,12 +50,13 @@ def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
     return [Table(columns, rows, caption)] if rows else []
 
 
-def _free_runs(findings: Findings, result: Diagnosis, judge: Experiment) -> list[Block]:
+def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Block]:
     rows: list[tuple[str | float, ...]] = []
     for name, s in result.signals.items():
         m = result.block_medians[name]
         factor = SHOWN[name][1]
         ratios = [s.nominal, m.nominal, s.refitted, m.refitted, s.with_effect, m.with_effect]
+        ratios.append(s.black_box)
         rows.append((SHOWN[name][0], s.noise * factor, *(ratio / s.noise for ratio in ratios)))
     columns = (
         "signal",
@@ -63,6 +67,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judge: Experiment) -> list
         "(blocks)",
         "with effect",
         "(blocks)",
+        "black box",
     )
     return [
         Heading(f"Free run on {Path(result.judged_on).name}"),
@@ -70,10 +75,11 @@ def _free_runs(findings: Findings, result: Diagnosis, judge: Experiment) -> list
             columns,
             rows,
             "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
-            "of the sensor noise. Up to 1.1 is at the noise, up to 2 explained.",
+            "of the sensor noise. Up to 1.1 is at the noise, up to 2 explained. The black box is a "
+            "linear model of measured signals, trained on the same recordings.",
         ),
         Picture(
-            free_runs_picture(findings, judge),
+            free_runs_picture(findings, judged),
             "The machine simulated from rest under the recorded valve command alone. "
             "Right: simulated minus measured, linear up to 5 times the noise.",
         ),
@@ -98,7 +104,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             "The band is twice the sensors' noise.",
         ),
     ]
-    if not quiet(rms(findings.residuals["refitted"]), findings.floor):
+    if not quiet(level(findings.residuals["refitted"]), findings.floor):
         figure, name = shape_picture(findings)
         blocks.append(
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")
@@ -138,15 +144,72 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
 
     def row(path: str, p: ParameterResult) -> tuple[str | float, ...]:
         about = stated[path]
-        return (path, about.origin, p.value, p.low, p.high, *about.deviation(0.0, 1.0), p.unit)
+        return (
+            path,
+            about.origin,
+            p.value,
+            p.low,
+            p.high,
+            *about.deviation(0.0, 1.0),
+            p.unit,
+            ", ".join(other.rsplit(".", 1)[1] for other in p.confounded_with),
+        )
 
     return [
         Heading("Parameters"),
         Table(
-            ("parameter", "stated", "fitted", "low", "high", "least", "most", "unit"),
+            ("parameter", "stated", "fitted", "low", "high", "least", "most", "unit", "with"),
             [row(path, p) for path, p in result.parameters.items()],
             "low, high: two standard deviations from the curvature of the fit, the tolerance "
-            "counted as knowledge; least, most: the maker's tolerance. What the recording cannot "
-            "tell stays near its stated value.",
+            "counted as knowledge; least, most: the maker's tolerance; with: what it is confounded "
+            "with. What the recording cannot tell stays near its stated value.",
+        ),
+    ]
+
+
+def _errors(result: Diagnosis) -> list[Block]:
+    rows: list[tuple[str | float, ...]] = []
+    for name, tests in result.tests.items():
+        ahead, noise = result.one_step[name], result.signals[name].noise
+        for stage in ("nominal", "refitted", "with_effect", "black_box"):
+            bounds = tests.intervals[stage]
+            rows.append(
+                (
+                    SHOWN[name][0],
+                    stage.replace("_", " "),
+                    bounds.low / noise,
+                    bounds.high / noise,
+                    getattr(ahead, stage) / ahead.noise,
+                    tests.whiteness[stage],
+                    tests.input_correlation[stage],
+                )
+            )
+    columns = ("signal", "model", "low", "high", "one step", "whiteness", "input")
+    return [
+        Heading("How sure the errors are, and what they still know"),
+        Table(
+            columns,
+            rows,
+            "low, high: the free run's RMS error in units of the noise, 95 % by block bootstrap. "
+            "one step: error one sample ahead of measured ones, in units of its noise. whiteness: "
+            "Ljung-Box statistic of the one-step error over its 95 % value, white below 1. input: "
+            "largest correlation of the free run's error with the command.",
+        ),
+    ]
+
+
+def _control(result: Diagnosis) -> list[Block]:
+    if not result.control:
+        return []
+    rows = [
+        (f"designed {name}", 1e3 * c.tracking, 1e2 * c.tcp) for name, c in result.control.items()
+    ]
+    return [
+        Heading("What it is worth to a controller"),
+        Table(
+            ("predictive controller", "stroke error, mm", "TCP deflection, cm"),
+            rows,
+            "Largest errors on moves of 64 mm away and back at 45 deg, simulated on the machine as "
+            "found; designed for the data sheet and for that machine.",
         ),
     ]

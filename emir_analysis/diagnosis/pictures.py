@@ -4,10 +4,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from emir_analysis.diagnosis.balances import BALANCES
-from emir_analysis.diagnosis.candidates import LINKAGE
 from emir_analysis.diagnosis.diagnose import Findings, loudest
-from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
-from emir_analysis.diagnosis.free_run import free_run
+from emir_analysis.diagnosis.experiment import OUTPUTS
+from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.report import new_figure
 
 MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"
@@ -26,23 +25,24 @@ SHOWN = {
 }
 
 
-def free_runs_picture(findings: Findings, judge: Experiment) -> Figure:
-    """Show each signal measured and simulated, and the errors beside it."""
-    figure = new_figure(8.0)
-    axes = figure.subplots(4, 2, sharex=True, width_ratios=(3, 2))
-    sensors = noise(findings.sheet.machine)
-    machines = {
-        "data sheet": (findings.sheet.machine, NOMINAL),
-        "re-fitted": (findings.refitted.machine, REFITTED),
-    }
+def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
+    """Show each measured signal and its simulations, and the errors beside it.
+
+    Of the first judge recording.
+    """
+    judge = judged.evidence.experiments[0]
+    rows = [k for k in range(len(OUTPUTS)) if judged.evidence.shown[k]]
+    figure = new_figure(0.6 + 1.9 * len(rows))
+    axes = figure.subplots(len(rows), 2, sharex=True, width_ratios=(3, 2), squeeze=False)
+    stages = {"nominal": ("data sheet", NOMINAL), "refitted": ("re-fitted", REFITTED)}
     if findings.chosen.effects:
-        machines["with effect"] = (findings.chosen.machine, FINAL)
-    runs = {name: (free_run(m, judge), colour) for name, (m, colour) in machines.items()}
-    for row, (signal, beside) in enumerate(axes):
+        stages["with_effect"] = ("with effect", FINAL)
+    for (signal, beside), row in zip(axes, rows, strict=True):
         label, factor = SHOWN[list(OUTPUTS)[row]]
-        for name, (run, colour) in runs.items():
-            error = (run[:, row] - judge.outputs[:, row]) / sensors[row]
-            signal.plot(judge.time, factor * run[:, row], color=colour, lw=1.0, label=name)
+        for stage, (name, colour) in stages.items():
+            run = judged.runs[stage][0][:, row]
+            error = (run - judge.outputs[:, row]) / judged.evidence.sensors[row]
+            signal.plot(judge.time, factor * run, color=colour, lw=1.0, label=name)
             beside.plot(judge.time, error, color=colour, lw=0.7)
         measured = factor * judge.outputs[:, row]
         signal.plot(judge.time, measured, color=MEASURED, lw=0.8, ls=(0, (3, 2)), label="measured")
@@ -58,9 +58,9 @@ def free_runs_picture(findings: Findings, judge: Experiment) -> Figure:
 
 def balances_picture(findings: Findings) -> Figure:
     """Show what is missing in each balance over time, with the band of the sensors' noise."""
-    figure = new_figure(6.5)
-    shown = [(k, name) for k, name in enumerate(BALANCES) if k != LINKAGE]
-    axes = figure.subplots(len(shown), 1, sharex=True)
+    shown = [(k, name) for k, name in enumerate(BALANCES) if findings.evidence.fitted[k]]
+    figure = new_figure(0.5 + 1.5 * max(1, len(shown)))
+    axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     stages = {"before": ("data sheet", NOMINAL), "refitted": ("re-fitted", REFITTED)}
     if findings.chosen.effects:
         stages["after"] = (findings.chosen.name, FINAL)
@@ -70,7 +70,7 @@ def balances_picture(findings: Findings) -> Figure:
         ax.axhspan(-band, band, color="#0b6bb5", alpha=0.12, lw=0)
         for stage, (text, colour) in stages.items():
             residual = factor * findings.residuals[stage][:, k]
-            ax.plot(findings.balances.time, residual, color=colour, lw=1.0, label=text)
+            ax.plot(findings.evidence.time, residual, color=colour, lw=1.0, label=text)
         ax.set_ylabel(label)
         _tidy(ax)
     axes[0].legend(ncols=3, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
@@ -84,14 +84,16 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
     name = loudest(refitted, findings.floor) or "force"
     k = list(BALANCES).index(name)
     label, factor = SHOWN.get(name, (name, 1.0))
-    balances, outputs = findings.balances, findings.experiment.outputs
-    velocity = balances.average(balances.velocity)
-    signals = {
-        "piston velocity, mm/s": 1e3 * velocity,
-        "piston stroke, mm": 1e3 * balances.average(outputs[:, 0]),
-        "p_H, bar": 1e-5 * balances.average(outputs[:, 1]),
-        "p_S, bar": 1e-5 * balances.average(outputs[:, 2]),
+    means = {key: values for key, (_, values) in findings.evidence.signals().items()}
+    velocity = means["piston_velocity"]
+    against = {
+        "piston_velocity": ("piston velocity, mm/s", 1e3),
+        "piston_stroke": ("piston stroke, mm", 1e3),
+        "pressure_lifting": ("p_H, bar", 1e-5),
+        "pressure_lowering": ("p_S, bar", 1e-5),
+        "time": ("time, s", 1.0),
     }
+    signals = {text: scale * means[key] for key, (text, scale) in against.items() if key in means}
     figure = new_figure(2.8)
     axes = figure.subplots(1, len(signals), sharey=True)
     for ax, (text, values) in zip(axes, signals.items(), strict=True):

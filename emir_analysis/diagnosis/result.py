@@ -7,27 +7,43 @@ from typing import Any
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.candidates import Trial
+from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
-from emir_analysis.diagnosis.free_run import block_medians, errors, rms
+from emir_analysis.diagnosis.experiment import OUTPUTS
+from emir_analysis.diagnosis.free_run import block_medians, rms
+from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
+from emir_analysis.diagnosis.statistics import (
+    Interval,
+    input_correlation,
+    rms_intervals,
+    whiteness,
+)
+from emir_analysis.diagnosis.telling import movement, untold
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
-INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
+WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
+CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
+SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of errors look back
 
 
 @dataclass(frozen=True)
 class ParameterResult:
-    """A fitted parameter; low, high: two standard deviations from the curvature of the fit."""
+    """A fitted parameter; low, high: two standard deviations from the curvature of the fit.
+
+    confounded_with: parameters whose fitted values go up or down with this one's.
+    """
 
     value: float
     unit: str
     low: float
     high: float
+    confounded_with: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -54,7 +70,7 @@ class CandidateResult:
 
 @dataclass(frozen=True)
 class BalanceResult:
-    """RMS over the windows; noise: the part that the sensors alone make."""
+    """RMS over the quieter 95 % of the windows; noise: the part that the sensors alone make."""
 
     unit: str
     noise: float
@@ -65,58 +81,92 @@ class BalanceResult:
 
 @dataclass(frozen=True)
 class SignalResult:
-    """RMS error of the free run; with_effect equals refitted where no effect is named."""
+    """RMS error of a model by stage; with_effect equals refitted where no effect is named."""
 
     unit: str
     noise: float
     nominal: float
     refitted: float
     with_effect: float
+    black_box: float
+
+
+@dataclass(frozen=True)
+class ErrorTests:
+    """How sure a signal's free-run error is and what it still knows, by stage.
+
+    intervals: of the RMS, 95 %, by block bootstrap. input_correlation: largest correlation of
+    the free run's error with the command. whiteness: Ljung-Box statistic of the one-step error
+    over its 95 % value; below 1 it is white.
+    """
+
+    intervals: dict[str, Interval]
+    input_correlation: dict[str, float]
+    whiteness: dict[str, float]
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """What a recording's machine lacks in the model, and the error before and after.
 
-    verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words.
-    signals: over the whole judge recording; block_medians: medians over its 15 s blocks.
-    parameters: the re-fitted tolerances of the final machine. shape: of what stays unexplained.
+    verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words. rivals:
+    what would do as well where ambiguous. tell_apart: a movement that would tell them apart.
+    signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
+    one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
+    stays unexplained. untold: what missing sensors leave open, by balance. control: a controller
+    designed before and after, on the machine as found, where that was asked for.
     """
 
     verdict: str
     statement: str
     effects: tuple[EffectResult, ...]
+    rivals: tuple[str, ...]
+    tell_apart: str | None
     candidates: tuple[CandidateResult, ...]
     balances: dict[str, BalanceResult]
     signals: dict[str, SignalResult]
     block_medians: dict[str, SignalResult]
+    one_step: dict[str, SignalResult]
+    tests: dict[str, ErrorTests]
     parameters: dict[str, ParameterResult]
     shape: Shape | None
+    untold: dict[str, str]
+    control: dict[str, ControlResult]
     recording: str
     judged_on: str
 
 
-def diagnosis(findings: Findings, judge: Experiment) -> Diagnosis:
-    """Put the findings into numbers, judged on a recording that no fit has seen."""
-    machines = [findings.sheet.machine, findings.refitted.machine, findings.chosen.machine]
-    found = [errors(machine, judge) for machine in machines]
+def diagnosis(
+    findings: Findings, judged: Judged, control: dict[str, ControlResult] | None = None
+) -> Diagnosis:
+    """Put the findings into numbers, judged on recordings that no fit has seen."""
+    period = judged.evidence.experiments[0].period
+    stages = (*STAGES, BLACK_BOX)
+    whole = {stage: np.concatenate(judged.errors(stage)) for stage in stages}
+    fitted = _parameters(findings.chosen)
     return Diagnosis(
         verdict=findings.verdict,
         statement=_statement(findings),
-        effects=_effects(findings),
+        effects=_effects(findings, fitted),
+        rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
+        tell_apart=_tell_apart(findings),
         candidates=_candidates(findings),
         balances=_balances(findings),
-        signals=_signals(findings, [rms(error) for error in found]),
-        block_medians=_signals(findings, [block_medians(e, judge.period) for e in found]),
-        parameters={
-            path: parameter
-            for path, parameter in _parameters(findings.chosen).items()
-            if path in findings.sheet.tolerances
-        },
+        signals=_signals(findings, {s: rms(error) for s, error in whole.items()}),
+        block_medians=_signals(findings, {s: block_medians(e, period) for s, e in whole.items()}),
+        one_step=_signals(findings, {s: rms(judged.one_step[s]) for s in stages}, _STEP_NOISE),
+        tests=_tests(judged, whole, period),
+        parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
-        recording=findings.experiment.name,
-        judged_on=judge.name,
+        untold=untold(findings.evidence),
+        control=control or {},
+        recording=", ".join(e.name for e in findings.evidence.experiments),
+        judged_on=", ".join(e.name for e in judged.evidence.experiments),
     )
+
+
+# one step ahead, a difference of two samples is predicted; the bending follows the force
+_STEP_NOISE = np.array([np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0), 1.0])
 
 
 def write_json(path: Path, result: Diagnosis) -> None:
@@ -132,21 +182,30 @@ def write_json(path: Path, result: Diagnosis) -> None:
 
 def summary(result: Diagnosis) -> str:
     """Return the result as lines for a terminal."""
-    lines = [f"{result.verdict}: {result.statement}", ""]
-    lines.append(f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}")
+    lines = [f"{result.verdict}: {result.statement}"]
+    if result.tell_apart:
+        lines.append(result.tell_apart)
+    lines += list(result.untold.values())
+    lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in result.balances.items():
         figures = (b.noise, b.before, b.refitted, b.after)
         lines.append(f"{name:24}" + "".join(f"{f:11.3g}" for f in figures) + f"  {b.unit}")
     lines += ["", f"free-run error on {result.judged_on}, times the sensor noise"]
-    lines.append(f"{'signal':24}{'noise':>11}{'nominal':>11}{'refitted':>11}{'with effect':>13}")
+    heads = ("noise", "nominal", "refitted", "with effect", "black box")
+    lines.append(f"{'signal':24}" + "".join(f"{head:>12}" for head in heads))
     for name, s in result.signals.items():
-        lines.append(f"{name:24}{s.noise:11.3g}" + _ratios(s) + f"  RMS, noise in {s.unit}")
-        lines.append(f"{'':35}" + _ratios(result.block_medians[name]) + "  median of 15 s blocks")
+        lines.append(f"{name:24}{s.noise:12.3g}" + _ratios(s) + f"  RMS, noise in {s.unit}")
+        lines.append(f"{'':36}" + _ratios(result.block_medians[name]) + "  median of 15 s blocks")
+    if result.control:
+        lines += ["", "predictive control of the machine as found, designed before and after"]
+    for name, c in result.control.items():
+        lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
     return "\n".join(lines)
 
 
 def _ratios(s: SignalResult) -> str:
-    return f"{s.nominal / s.noise:11.2f}{s.refitted / s.noise:11.2f}{s.with_effect / s.noise:13.2f}"
+    figures = (s.nominal, s.refitted, s.with_effect, s.black_box)
+    return "".join(f"{figure / s.noise:12.2f}" for figure in figures)
 
 
 def _statement(findings: Findings) -> str:
@@ -157,10 +216,10 @@ def _statement(findings: Findings) -> str:
     remainder = ""
     if speaking is not None and shape is not None:
         column = list(BALANCES).index(speaking)
-        size = rms(findings.residuals["after"])[column]
+        size = level(findings.residuals["after"])[column]
         noise_share = size / findings.floor[column]
         remainder = (
-            f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking]}"
+            f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
             f" ({noise_share:.1f} times its noise); {_described(shape)}"
         )
     if findings.verdict == "unexplained":
@@ -180,16 +239,32 @@ def _described(shape: Shape) -> str:
     return f"{shape.predictor}{direction} predicts {100 * shape.share:.0f} % of it"
 
 
-def _parameters(trial: Any) -> dict[str, ParameterResult]:
+def _tell_apart(findings: Findings) -> str | None:
+    if findings.verdict != "ambiguous":
+        return None
+    trials = [findings.chosen, *findings.rivals]
+    best, apart = movement(trials, findings.evidence)
+    return f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise"
+
+
+def _parameters(trial: Trial) -> dict[str, ParameterResult]:
+    members = trial.unknowns.members
+    spread = trial.spread
+    correlation = np.nan_to_num(trial.covariance / np.outer(spread, spread))
     result = {}
-    for unknown, x, spread in zip(trial.unknowns.members, trial.x, trial.spread, strict=True):
-        low, high = unknown.deviation(float(x), INTERVAL * float(spread))
-        result[unknown.path] = ParameterResult(unknown.value(float(x)), unknown.unit, low, high)
+    for k, (unknown, x) in enumerate(zip(members, trial.x, strict=True)):
+        low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
+        with_it = tuple(
+            other.path
+            for j, other in enumerate(members)
+            if j != k and abs(correlation[k, j]) > CONFOUNDED
+        )
+        value = unknown.value(float(x))
+        result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
     return result
 
 
-def _effects(findings: Findings) -> tuple[EffectResult, ...]:
-    fitted = _parameters(findings.chosen)
+def _effects(findings: Findings, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:
     return tuple(
         EffectResult(
             name,
@@ -219,19 +294,49 @@ def _candidates(findings: Findings) -> tuple[CandidateResult, ...]:
 
 
 def _balances(findings: Findings) -> dict[str, BalanceResult]:
-    figures = [rms(findings.residuals[stage]) for stage in ("before", "refitted", "after")]
+    """Return those balances that the signals allow."""
+    figures = [level(findings.residuals[stage]) for stage in ("before", "refitted", "after")]
     return {
-        name: BalanceResult(unit, float(findings.floor[k]), *(float(f[k]) for f in figures))
-        for k, (name, unit) in enumerate(BALANCES.items())
+        name: BalanceResult(balance.unit, float(findings.floor[k]), *(float(f[k]) for f in figures))
+        for k, (name, balance) in enumerate(BALANCES.items())
+        if findings.evidence.told[k]
     }
 
 
-def _signals(findings: Findings, figures: list[Array]) -> dict[str, SignalResult]:
-    sensors = noise(findings.sheet.machine)
+def _signals(
+    findings: Findings, figures: dict[str, Array], factor: Array | None = None
+) -> dict[str, SignalResult]:
+    """Return the measured signals' figures; factor: (4,) on the sensors' noise."""
+    sensors = findings.evidence.sensors * (1.0 if factor is None else factor)
     return {
-        name: SignalResult(unit, float(sensors[k]), *(float(f[k]) for f in figures))
+        name: SignalResult(unit, float(sensors[k]), **{s: float(f[k]) for s, f in figures.items()})
         for k, (name, unit) in enumerate(OUTPUTS.items())
+        if findings.evidence.shown[k]
     }
+
+
+def _tests(judged: Judged, whole: dict[str, Array], period: float) -> dict[str, ErrorTests]:
+    experiments = judged.evidence.experiments
+    command = np.concatenate(
+        [np.append(e.commands, e.commands[-1])[:: e.every] for e in experiments]
+    )
+    intervals = {stage: rms_intervals(error, period) for stage, error in whole.items()}
+    result = {}
+    for k, name in enumerate(OUTPUTS):
+        if not judged.evidence.shown[k]:
+            continue
+        result[name] = ErrorTests(
+            {stage: found[k] for stage, found in intervals.items()},
+            {
+                stage: input_correlation(error[:, k], command, period, SLOW_PERIOD)
+                for stage, error in whole.items()
+            },
+            {
+                stage: whiteness(error[:, k], period, SLOW_PERIOD)
+                for stage, error in judged.one_step.items()
+            },
+        )
+    return result
 
 
 def _plain(value: Any) -> Any:

@@ -1,17 +1,15 @@
-"""Choosing among trials by their error on a part of the recording that no fit has seen."""
+"""Choosing among trials by their error on a part of the recordings that no fit has seen."""
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW, Balances
-from emir_analysis.diagnosis.candidates import LINKAGE, Trial
-from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.free_run import errors
+from emir_analysis.diagnosis.balances import FORCE_WINDOW
+from emir_analysis.diagnosis.candidates import Trial, free_run_errors
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
 
-SEEN = 2.0 / 3.0  # share of the recording, from its start, that the fits see before the choice
+SEEN = 2.0 / 3.0  # share of each recording, from its start, that the fits see before the choice
 STRONG = 10.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
 SPEAKS = np.sqrt(2.0)  # times the floor: what is systematic is then larger than the noise
-NAMED = 0.1  # share of what speaks that may be left after an effect that is named
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
 BLOCK = 1.0  # s: errors closer than this are not counted as independent
 
@@ -26,25 +24,24 @@ def score(mean_squares: Array, independent: float, unknowns: int) -> float:
     return misfit + unknowns * float(np.log(independent * mean_squares.size))
 
 
-def balance_score(trial: Trial, balances: Balances, floor: Array) -> float:
-    """Score a trial on the windows of a recording behind the part that the fit has seen."""
-    speaking = np.arange(len(BALANCES)) != LINKAGE
-    time = balances.time
-    unseen = time > SEEN * time[-1] + FORCE_WINDOW
-    missing = (balances.residuals([trial.machine])[0] / floor)[unseen][:, speaking]
-    independent = float(np.ptp(time[unseen])) / BLOCK
-    return score(np.mean(missing**2, axis=0), independent, trial.x.size)
+def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
+    """Score a trial on the windows of recordings behind the part that the fit has seen."""
+    unseen = evidence.behind(SEEN)
+    missing = (evidence.residuals([trial.machine])[0] / floor)[unseen][:, evidence.fitted]
+    count = len(evidence.experiments)
+    independent = (evidence.duration(1.0 - SEEN) - count * FORCE_WINDOW) / BLOCK
+    # as the fit counts them: far above the noise by their size, so that no window decides alone
+    misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))
+    return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
 
 
-def free_run_score(trial: Trial, experiment: Experiment, noise: Array) -> float:
+def free_run_score(trial: Trial, evidence: Evidence) -> float:
     """Score a trial on the free run's continuation behind the part that the fit has seen."""
-    time = experiment.time
-    unseen = time > SEEN * time[-1]
-    error = (errors(trial.machine, experiment) / noise)[unseen]
-    if not np.all(np.isfinite(error)):
+    errors = free_run_errors(trial.machine, evidence)
+    unseen = np.concatenate([error[int(SEEN * len(error)) :] for error in errors])
+    if not np.all(np.isfinite(unseen)):
         return float("inf")
-    independent = float(np.ptp(time[unseen])) / BLOCK
-    return score(np.mean(error**2, axis=0), independent, trial.x.size)
+    return score(np.mean(unseen**2, axis=0), evidence.duration(1.0 - SEEN) / BLOCK, trial.x.size)
 
 
 def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
@@ -62,15 +59,14 @@ def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
     return [trials[best], *close]
 
 
-def quiet(rms: Array, floor: Array) -> bool:
-    """Tell whether no balance holds more than its noise; rms, floor: (b,)."""
-    return bool(np.all(rms <= SPEAKS * floor))
+def quiet(left: Array, floor: Array) -> bool:
+    """Tell whether no balance holds more than its noise; left, floor: levels, (b,).
+
+    NaN, a balance that the signals do not allow, is quiet.
+    """
+    return not np.any(left > SPEAKS * floor)
 
 
-def named(before: Array, after: Array, floor: Array) -> bool:
-    """Tell whether what speaks in the balances is down to the noise or to a tenth; (b,) each."""
-
-    def systematic(rms: Array) -> Array:
-        return np.asarray(np.sqrt(np.maximum(rms**2 - floor**2, 0.0)))
-
-    return bool(np.all(systematic(after) <= np.maximum(floor, NAMED * systematic(before))))
+def explained(errors: list[Array]) -> bool:
+    """Tell whether a free run explains its recordings: all signals together, in their noise."""
+    return bool(np.sqrt(np.mean(np.concatenate(errors) ** 2)) <= EXPLAINED)

@@ -7,6 +7,7 @@ import recorded
 from emir_analysis.diagnosis.balances import BALANCES, Balances
 from emir_analysis.diagnosis.experiment import experiment
 from emir_analysis.signals import Recording, Signal
+from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine
 from emir_plant.sheet import load_sheet
 
@@ -24,7 +25,32 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def residuals(machine: Machine, friction: recorded.Force | None) -> tuple[Balances, recorded.Array]:
     """Return the balances of the machine along a run with friction, and what they lack."""
     commands = recorded.moves(16.0, seed=5)
-    sensors = recorded.measured(machine, recorded.simulate(machine, commands, friction), seed=5)
+    balances = balances_of(machine, commands, recorded.simulate(machine, commands, friction))
+    return balances, balances.residuals([machine])[0]
+
+
+def distorted(machine: Machine, wrong: Machine) -> Balances:
+    """Return the balances of a run of the machine, read by the sensors of the wrong one.
+
+    A bias, a gain and a lag written a second time, the lag by its step response.
+    """
+    effects = wrong.effects
+    commands = recorded.moves(16.0, seed=5)
+    truth = recorded.simulate(machine, commands)
+    decay = np.exp(-recorded.SAMPLE_PERIOD / effects.sensor_delay.deflection)
+    bent = truth[:, 3] - truth[:, 2]
+    late = [bent[0]]
+    for now, before in zip(bent[1:], bent[:-1], strict=True):
+        late.append(decay * late[-1] + (1.0 - decay) * 0.5 * (now + before))
+    truth[:, 3] = truth[:, 2] + late
+    truth[:, 0] += effects.sensor_bias.pressure_lifting
+    truth[:, 1] *= 1.0 + effects.sensor_gain.pressure_lowering
+    return balances_of(machine, commands, truth)
+
+
+def balances_of(machine: Machine, commands: recorded.Array, truth: recorded.Array) -> Balances:
+    """Return the balances of a run whose true signals are given."""
+    sensors = recorded.measured(machine, truth, seed=5)
     topics = {
         "joint_angle": "joint_states",
         "piston_stroke": "cylinder",
@@ -35,8 +61,7 @@ def residuals(machine: Machine, friction: recorded.Force | None) -> tuple[Balanc
     signals = {name: Signal(name, *sensors[topic], "") for name, topic in topics.items()}
     time = np.arange(commands.size) * recorded.COMMAND_PERIOD
     signals["valve_command"] = Signal("valve_command", time, commands, "1")
-    balances = Balances(experiment("run", Recording(signals, 0), machine), machine)
-    return balances, balances.residuals([machine])[0]
+    return Balances(experiment("run", Recording(signals, 0), machine), machine)
 
 
 def rms(missing: recorded.Array) -> dict[str, float]:
@@ -63,10 +88,29 @@ def test_friction_shows_in_the_force_balance_and_leaves_the_chambers_quiet(
 ) -> None:
     _, quiet = residuals(machine, None)
     balances, missing = residuals(machine, lambda _, v: FRICTION * float(np.tanh(v / 1e-3)))
-    velocity = balances.average(balances.velocity)
+    _, velocity = balances.signals()["piston_velocity"]
     steady = np.abs(velocity) > 0.015
     force = missing[:, 0]
     assert np.median(force[steady & (velocity > 0.0)]) == pytest.approx(-FRICTION, rel=0.05)
     assert np.median(force[steady & (velocity < 0.0)]) == pytest.approx(FRICTION, rel=0.05)
     assert rms(missing)["lifting_chamber"] < 1.5 * rms(quiet)["lifting_chamber"]
     assert rms(missing)["lowering_chamber"] < 1.5 * rms(quiet)["lowering_chamber"]
+
+
+def test_a_sensor_that_is_known_to_distort_leaves_the_balances_quiet(machine: Machine) -> None:
+    balances, _ = residuals(machine, None)
+    wrong = with_values(
+        machine,
+        {
+            "effects.sensor_bias.pressure_lifting": 3e5,
+            "effects.sensor_gain.pressure_lowering": 0.05,
+            "effects.sensor_delay.deflection": 0.02,
+        },
+    )
+    seen, unseen = distorted(machine, wrong).residuals([wrong, machine])
+    quiet, loud = rms(seen), rms(unseen)
+    healthy = rms(balances.residuals([machine])[0])
+    for name in ("force", "lifting_chamber", "lowering_chamber", "bending"):
+        assert quiet[name] < 1.5 * healthy[name], name
+    assert loud["force"] > 5.0 * quiet["force"]
+    assert loud["bending"] > 1.5 * quiet["bending"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import recorded
 
+from emir_analysis import bags
 from emir_analysis.diagnosis import Diagnosis, command, summary
 from emir_analysis.diagnosis.unknowns import unknowns, with_values
 from emir_analysis.errors import InputError
@@ -40,7 +41,16 @@ def diagnose(folder: Path, bag: Path, judge: Path | None = None) -> Diagnosis:
     """Diagnose a recording with the folder's data sheet; leave JSON and HTML beside it."""
     sheet, signals = folder / "datasheet.yaml", folder / "signals.yaml"
     reports = bag.with_suffix(".json"), bag.with_suffix(".html")
-    return command(bag, sheet, signals, judge, *reports, lambda _: None)
+    return command(
+        bag,
+        sheet,
+        signals,
+        judge,
+        *reports,
+        lambda _: None,
+        model_out=bag.with_suffix(".yaml"),
+        predictions=bag.parent / "runs",
+    )
 
 
 def test_a_healthy_machine_gets_its_parameters_and_no_effect(
@@ -74,6 +84,17 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     assert effect.parameters["force"].value == pytest.approx(15e3, rel=0.02)
     for signal in result.signals.values():
         assert signal.with_effect < 1.2 * signal.noise < 0.5 * signal.refitted
+        assert signal.with_effect < signal.black_box
+    for tests in result.tests.values():
+        assert tests.input_correlation["with_effect"] < tests.input_correlation["refitted"]
+    model = load_sheet(tmp_path / "a.yaml").machine  # what the plant node is given
+    assert model.effects.coulomb_friction.force == effect.parameters["force"].value
+    assert model.effects.payload.mass == 0.0
+    simulated = bags.read(tmp_path / "runs" / "b_with_effect.mcap")
+    shown = [message.data.data for message in simulated["/with_effect/pressure_lifting"]]
+    measured = [message.data.data for message in simulated["/measured/pressure_lifting"]]
+    off = float(np.sqrt(np.mean((np.array(shown) - np.array(measured)) ** 2)))
+    assert off == pytest.approx(result.signals["pressure_lifting"].with_effect)
     written = json.loads((tmp_path / "a.json").read_text())
     assert written["verdict"] == "found"
     assert written["effects"][0]["parameters"]["force"]["unit"] == "N"
@@ -129,6 +150,32 @@ def _short(topics: Topics) -> None:
         topics[name] = (time[:200], value[:200])
 
 
+def _in_bar(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    topics["pressure_lifting"] = (time, value * 1e-5)
+
+
+def _in_degrees(topics: Topics) -> None:
+    time, value = topics["joint_states"]
+    topics["joint_states"] = (time, np.degrees(value))
+
+
+def _dead_sensor(topics: Topics) -> None:
+    time, value = topics["pressure_lowering"]
+    topics["pressure_lowering"] = (time, np.full_like(value, 2e5))
+
+
+def _not_recorded(topics: Topics) -> None:
+    del topics["boom_deflection"]
+
+
+def _twice_the_same_time(topics: Topics) -> None:
+    time, value = topics["cylinder"]
+    time = time.copy()
+    time[701] = time[700]
+    topics["cylinder"] = (time, value)
+
+
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
@@ -137,6 +184,11 @@ def _short(topics: Topics) -> None:
         (_moving, "a second at rest"),
         (_gap, "gap of 1.0"),
         (_short, "record at least 10 s"),
+        (_in_bar, "is it in bar"),
+        (_in_degrees, "is it in deg"),
+        (_dead_sensor, "pressure_lowering is constant"),
+        (_not_recorded, "topic /rig/boom_deflection is not recorded"),
+        (_twice_the_same_time, "/rig/cylinder: stamps out of order at 7.0"),
     ],
 )
 def test_a_recording_of_no_use_is_told_with_what_to_record(
@@ -144,13 +196,20 @@ def test_a_recording_of_no_use_is_told_with_what_to_record(
 ) -> None:
     time = np.arange(1500) * 0.01
     swing = np.pi / 4.0 + 0.1 * np.sin(time)
-    sensors = ("joint_states", "cylinder", "pressure_lifting", "pressure_lowering")
-    topics = dict.fromkeys((*sensors, "boom_deflection"), (time, swing))
+    topics = dict.fromkeys(("joint_states", "cylinder", "boom_deflection"), (time, swing))
+    topics |= dict.fromkeys(("pressure_lifting", "pressure_lowering"), (time, 1e7 * swing))
     topics["valve_command"] = (time, 0.4 * (time > 1.0))
     spoil(topics)
     recorded.write_bag(tmp_path / "bag", topics)
     with pytest.raises(InputError, match=reason) as told:
         diagnose(folder, tmp_path / "bag")
+    assert "\n" not in str(told.value)
+
+
+def test_a_damaged_recording_is_told(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "bag.mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(range(256)))
+    with pytest.raises(InputError, match="damaged") as told:
+        diagnose(folder, tmp_path / "bag.mcap")
     assert "\n" not in str(told.value)
 
 

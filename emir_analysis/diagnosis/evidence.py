@@ -1,0 +1,95 @@
+"""All recordings of one machine together: their balances and free runs in one vector each."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_analysis.diagnosis.balances import (
+    FORCE_WINDOW,
+    LINKAGE,
+    Balances,
+    available,
+    level,
+    noise_floor,
+)
+from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
+from emir_analysis.errors import InputError
+from emir_analysis.signals import Array
+from emir_plant.parameters import Machine
+
+
+class Evidence:
+    """Recordings of one machine, which stands in the data sheet as `stated`.
+
+    experiments: all with the same signals. sensors: (4,) the outputs' noise, NaN where an output
+    is not measured. told: (5,) which balances the signals allow; fitted: (5,) which of them hold
+    something that parameters could change.
+    """
+
+    def __init__(self, experiments: Sequence[Experiment], stated: Machine) -> None:
+        self.experiments = tuple(experiments)
+        self.stated = stated
+        self.measured = frozenset.intersection(*(e.measured for e in self.experiments))
+        shown = np.array([name in self.measured for name in OUTPUTS])
+        self.sensors = np.where(shown, noise(stated), np.nan)
+        self.shown = shown
+        self.told = available(self.measured)
+        self.fitted: NDArray[np.bool_] = self.told & (np.arange(self.told.size) != LINKAGE)
+        self._balances = [Balances(experiment, stated) for experiment in self.experiments]
+        self.windows_of_first = self._balances[0].time.size
+
+    def head(self, share: float) -> "Evidence":
+        """Return the first part of every recording."""
+        return Evidence([e.head(share) for e in self.experiments], self.stated)
+
+    @property
+    def time(self) -> Array:
+        """Middle of the balances' windows, (w,) s, one recording behind the other."""
+        parts, offset = [], 0.0
+        for experiment, balances in zip(self.experiments, self._balances, strict=True):
+            parts.append(balances.time + offset)
+            offset += float(experiment.time[-1])
+        return np.concatenate(parts)
+
+    def behind(self, share: float) -> NDArray[np.bool_]:
+        """Tell which windows lie behind the first part of their recording, (w,)."""
+        late = [b.time > share * b.time[-1] + FORCE_WINDOW for b in self._balances]
+        return np.concatenate(late)
+
+    def duration(self, share: float) -> float:
+        """Return the length of a share of all recordings, s."""
+        return share * sum(float(e.time[-1]) for e in self.experiments)
+
+    def signals(self) -> dict[str, tuple[str, Array]]:
+        """Return unit and window means, (w,), of what a residual may depend on."""
+        each = [balances.signals() for balances in self._balances]
+        return {
+            name: (each[0][name][0], np.concatenate([found[name][1] for found in each]))
+            for name in each[0]
+            if all(name in found for found in each)
+        }
+
+    def residuals(self, machines: Sequence[Machine]) -> Array:
+        """Return what is missing in each balance, (m, w, 5), SI units."""
+        return np.concatenate([b.residuals(machines) for b in self._balances], axis=1)
+
+    def one_step(self, machine: Machine) -> Array:
+        """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
+        return np.concatenate([balances.one_step(machine) for balances in self._balances])
+
+    def check_like(self, other: "Evidence") -> None:
+        """Raise InputError where these recordings lack a signal that others have."""
+        lacking = sorted(other.measured - self.measured)
+        if lacking:
+            raise InputError(f"{self.experiments[0].name}: no {lacking[0]}, which the others have")
+
+    def floor(self, machine: Machine) -> Array:
+        """Return the level, (5,), that the sensors of a machine alone leave in each balance.
+
+        The linkage balance is exact: there it is the stroke's own noise.
+        """
+        left = np.concatenate([noise_floor(e, machine) for e in self.experiments])
+        floor = level(left)
+        floor[LINKAGE] = self.sensors[0]
+        return floor

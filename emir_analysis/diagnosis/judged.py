@@ -1,0 +1,67 @@
+"""The models on recordings that no fit has seen: free runs, one step ahead, a black box beside."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from emir_analysis.diagnosis import black_box
+from emir_analysis.diagnosis.candidates import free_run
+from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.signals import Array
+from emir_plant.parameters import Machine
+
+STAGES = ("nominal", "refitted", "with_effect")
+BLACK_BOX = "black_box"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What each model says of the judge recordings.
+
+    runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
+    errors (n, 4) of predicting one sample ahead from measured ones, all recordings in one.
+    NaN where an output has no sensor or a machine cannot rest where the recording starts.
+    """
+
+    evidence: Evidence
+    runs: dict[str, list[Array]]
+    one_step: dict[str, Array]
+
+    def errors(self, stage: str) -> list[Array]:
+        """Return simulated minus measured, (n, 4), of each recording."""
+        pairs = zip(self.runs[stage], self.evidence.experiments, strict=True)
+        return [run - experiment.outputs for run, experiment in pairs]
+
+
+def machines(findings: Findings) -> dict[str, Machine]:
+    """Return the machine of each stage; without an effect named, the last is the re-fitted one."""
+    found = (findings.sheet.machine, findings.refitted.machine, findings.chosen.machine)
+    return dict(zip(STAGES, found, strict=True))
+
+
+def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
+    """Run every model, its parameters as they are, on recordings to be judged on."""
+    evidence = Evidence(experiments, findings.sheet.machine)
+    evidence.check_like(findings.evidence)
+    runs = {
+        stage: [free_run(machine, e, evidence) for e in evidence.experiments]
+        for stage, machine in machines(findings).items()
+    }
+    one_step = {stage: evidence.one_step(machine) for stage, machine in machines(findings).items()}
+    free = black_box.train(findings.evidence)
+    ahead = black_box.train_one_step(findings.evidence)
+    runs[BLACK_BOX] = [_spread(free.free_run(e), evidence) for e in evidence.experiments]
+    one_step[BLACK_BOX] = np.concatenate(
+        [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
+    )
+    return Judged(evidence, runs, one_step)
+
+
+def _spread(shown: Array, evidence: Evidence) -> Array:
+    """Return the outputs that sensors show, (n, c), at their places among all, (n, 4)."""
+    result = np.full((len(shown), evidence.shown.size), np.nan)
+    result[:, evidence.shown] = shown
+    return result

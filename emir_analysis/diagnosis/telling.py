@@ -1,0 +1,81 @@
+"""What a recording cannot tell, and what to record instead."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.candidates import Trial
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import COMMAND_STEP
+from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.signals import Array
+
+# what only this balance shows: effects that can otherwise not be named, or not be told apart
+ONLY_HERE = {
+    "force": "friction, payload, external load and linkage cannot be told from each other",
+    "lifting_chamber": "valve, leakage and air of the lifting side show in the motion alone",
+    "lowering_chamber": "valve, leakage and air of the lowering side show in the motion alone",
+    "linkage": "a stroke that does not fit the angle goes unseen",
+    "bending": "the bending modes stay as stated, and a load is told from friction less well",
+}
+
+REST = 1.0  # s
+PERIOD = 10e-3  # s, between the samples that are compared
+
+
+def _moves(*pieces: tuple[float, float]) -> Array:
+    """Return a command on its grid: at rest, then pieces of (y2, s)."""
+    parts = [np.zeros(round(REST / COMMAND_STEP))]
+    parts += [np.full(round(length / COMMAND_STEP), y) for y, length in pieces]
+    return np.concatenate(parts)
+
+
+MOVEMENTS = {
+    "slow moves up and down (a fifth of the opening, 6 s each)": _moves(
+        (0.28, 6.0), (0.0, 2.0), (-0.28, 6.0), (0.0, 6.0)
+    ),
+    "fast moves up and down (two thirds of the opening, 2 s each)": _moves(
+        (0.7, 2.0), (0.0, 4.0), (-0.7, 2.0), (0.0, 4.0), (0.7, 2.0), (-0.7, 2.0), (0.0, 4.0)
+    ),
+    "short reversals at the edge of the dead zone (1 s each)": _moves(
+        *[(y, 1.0) for _ in range(5) for y in (0.2, -0.2)], (0.0, 10.0)
+    ),
+    "one move and then a minute at rest with both chambers shut": _moves((0.4, 2.0), (0.0, 57.0)),
+    "one long move over most of the stroke (10 s)": _moves((0.45, 10.0), (0.0, 9.0)),
+}
+
+
+def untold(evidence: Evidence) -> dict[str, str]:
+    """Return, by the balance that missing sensors leave out, what can then not be told."""
+    lines = {}
+    for name, told in zip(BALANCES, evidence.told, strict=True):
+        if not told:
+            missing = " and ".join(sorted(BALANCES[name].signals - evidence.measured))
+            lines[name] = f"without {missing} {ONLY_HERE[name]}"
+    return lines
+
+
+def movement(rivals: Sequence[Trial], evidence: Evidence) -> tuple[str, float]:
+    """Return which movement tells fitted trials apart best, and how far.
+
+    How far: least RMS difference between two of them, in units of the sensors' noise.
+    """
+    apart = {name: _apart(rivals, commands, evidence) for name, commands in MOVEMENTS.items()}
+    best = max(apart, key=apart.__getitem__)
+    return best, apart[best]
+
+
+def _apart(rivals: Sequence[Trial], commands: Array, evidence: Evidence) -> float:
+    experiment = evidence.experiments[0].under(commands)
+    start = experiment.start()
+    begin = (start[0], evidence.stated.supply.pT if np.isnan(start[1]) else start[1])
+    machines = [trial.machine for trial in rivals]
+    runs = free_runs(machines, experiment, [begin] * len(machines))[:, :, ANGLE + 1 :]
+    shown = (runs / evidence.sensors)[:, :, evidence.shown]
+    differences = [
+        float(np.sqrt(np.mean((shown[i] - shown[j]) ** 2)))
+        for i in range(len(rivals))
+        for j in range(i)
+    ]
+    return float(np.nan_to_num(min(differences), nan=0.0))

@@ -14,8 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Header
 
+from emir_analysis.info import CHANGE, PARAMETERS, Change
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
@@ -43,7 +46,7 @@ from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import stamp_ns
 
-PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
+EVENTS = 1000  # depth, as ROS has it for parameter events
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
 
@@ -68,6 +71,7 @@ class RecorderNode(Shell):
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._failed = False
+        self.changes = 0  # of parameters, recorded
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
@@ -75,6 +79,8 @@ class RecorderNode(Shell):
         self._described = not any(nodes)
         if not self._described:
             self._record_of_parameters = ParameterRecord(self, nodes, self._describe)
+        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
+        self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
 
@@ -172,6 +178,17 @@ class RecorderNode(Shell):
         self._writer.add_metadata(PARAMETERS, as_metadata(answers))
         self._described = True
         self._write_complete_stamps()
+
+    def _on_change(self, event: ParameterEvent) -> None:
+        """Store what was set at a node while it runs, with the recording's own time."""
+        if self._nodes and event.node not in self._nodes:
+            return
+        time = self._next if self.lockstep else self.get_clock().now().nanoseconds
+        for parameter in event.changed_parameters:
+            value = parameter_value_to_python(parameter.value)
+            change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
+            self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
+            self.changes += 1
 
     def _report(self, stamp: int) -> None:
         message: Any = Header()

@@ -9,11 +9,21 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from emir_analysis.outer_loop import lqg_signals, pfc_signals
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
+from emir_control.limits import LimitParameters
 from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc, PfcInputs
+from emir_control.prefilter import PrefilterParameters, joint_angle, piston_stroke
 from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.tip import Tip, TipInputs
-from emir_control.trajectory import AwayAndBack, Move, Reference, TrajectoryInputs
+from emir_control.trajectory import (
+    AwayAndBack,
+    Motion,
+    Move,
+    Reference,
+    TrajectoryInputs,
+    TrajectoryState,
+)
+from emir_control.waypoints import Along, Axis, Coordinate, Followed, Waypoints, curve
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CASCADE_TERMS,
@@ -52,6 +62,16 @@ class NodeControl(Stepping, Protocol):
     outputs: ClassVar[Topics]
 
 
+class Guidable(NodeControl, Protocol):
+    """A trajectory that can be stopped and given another way."""
+
+    def held(self, state: Any, dt: float) -> Any:
+        """Return the state in which the reference comes to rest and stays there."""
+
+    def follow(self, state: Any, points: Waypoints, dt: float) -> Any:
+        """Return the state that follows the waypoints from here. Raises WaypointError."""
+
+
 @runtime_checkable
 class Switchable(NodeControl, Protocol):
     """A controller that can hold its state ready while another one moves the machine.
@@ -66,6 +86,42 @@ class Switchable(NodeControl, Protocol):
         """Return the state whose next command is the one in force."""
 
 
+class _Piston:
+    """A stroke given as such."""
+
+    def stroke(self, angle: float) -> float:
+        """Return the stroke."""
+        return angle
+
+    def angle(self, stroke: float) -> float:
+        """Return the stroke."""
+        return stroke
+
+
+class _Boom:
+    """A stroke given by the angle of joint 1."""
+
+    linkage = PrefilterParameters()
+
+    def stroke(self, angle: float) -> float:
+        """Return the stroke, m, at an angle, rad."""
+        return piston_stroke(angle, self.linkage)
+
+    def angle(self, stroke: float) -> float:
+        """Return the angle, rad, at a stroke, m."""
+        return joint_angle(stroke, self.linkage)
+
+
+def _axis(name: str, coordinate: Coordinate) -> Axis:
+    limits = LimitParameters()
+    margin = limits.end_margin
+    low, high = limits.stroke_low + margin, limits.stroke_high - margin
+    return Axis(name, coordinate, low, high, limits.speed)
+
+
+JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", _Piston()), _axis("joint1", _Boom())
+
+
 @dataclass(frozen=True)
 class TrajectoryControl:
     """trajectory_node: the desired piston motion."""
@@ -78,12 +134,28 @@ class TrajectoryControl:
         """Return the next state and the reference of this period and of the next ones."""
         inputs = TrajectoryInputs(signals["stroke"])
         state = state or self.trajectory.initial(inputs)
-        ahead = self.trajectory.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
-        move = dict(zip(CYLINDER_MOVE.fields, self.trajectory.move(state, dt), strict=True))
-        state, now = self.trajectory.step(state, inputs, dt)
+        motion = self._motion(state)
+        ahead = motion.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
+        move = dict(zip(CYLINDER_MOVE.fields, motion.move(state, dt), strict=True))
+        state, now = motion.step(state, inputs, dt)
         reference = {"reference_stroke": now.stroke, "reference_velocity": now.velocity}
         preview = dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
         return state, reference | preview | move
+
+    def held(self, state: TrajectoryState, dt: float) -> TrajectoryState:
+        """Return the state in which the reference comes to rest and stays there."""
+        motion = self._motion(state).held(state.ticks * dt, state.start)
+        return TrajectoryState(state.start, 0, motion)
+
+    def follow(self, state: TrajectoryState, points: Waypoints, dt: float) -> TrajectoryState:
+        """Return the state that follows waypoints of cylinder1 or joint1. Raises WaypointError."""
+        now = self._motion(state).at(state.ticks * dt, state.start)
+        axis = JOINT1_ANGLE if "joint1" in points.names else JOINT1_STROKE
+        strokes = curve(points, [axis], [now])
+        return TrajectoryState(state.start, 0, Followed(strokes, Along(float(strokes.x[-1]))))
+
+    def _motion(self, state: TrajectoryState) -> Motion:
+        return state.motion or self.trajectory
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.force_loop import ForceLoop, ForceLoopInputs
 from emir_control.robot_trajectory import RobotTrajectory, RobotTrajectoryInputs
 from emir_control.trajectory import Reference
+from emir_control.waypoints import Waypoints
 from emir_msgs_py.robot_topics import (
     JOINTS,
     PRESSURES,
@@ -51,6 +52,14 @@ class RobotTrajectoryControl:
         yaw = math.atan2(now.place[1], now.place[0])
         outputs |= pose_signals("tcp_reference", now.place[:3], _quaternion(yaw, now.place[3]))
         return state, outputs
+
+    def held(self, state: Any, dt: float) -> Any:
+        """Return the state in which the reference comes to rest and stays there."""
+        return self.trajectory.held(state, dt)
+
+    def follow(self, state: Any, points: Waypoints, dt: float) -> Any:
+        """Return the state that follows waypoints of the six joints. Raises WaypointError."""
+        return self.trajectory.follow(state, points, dt)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ At a move's start the payload is read from the piston force at rest, the move is
 
     u = u_plan - d - L (x - x_target),    x_target = 0 but for s = f,
 
-with the state x, the unknown force f and the unknown flow d estimated by a Kalman filter. The
+with the state x, the unknown force f, flow d and load p estimated by a Kalman filter. The
 drive's inverse (`actuator.py`) turns u into the valve command by the pressures as measured.
 """
 
@@ -201,12 +201,13 @@ class Lqg:
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
-        estimate = self._corrected(state, inputs, target)
+        arrived = time >= plan.duration
+        estimate = self._corrected(state, inputs, target, arrived=arrived)
         from_plan = plan.velocity(time + self._late, dt)
         logic = max(state.logic, LEAST_OPEN)
         oil = Oil(target.stroke, inputs.pressure_lifting, inputs.pressure_lowering, logic)
         wanted = from_plan + self._feedback(state, estimate, Now(time + self._late, dt, oil))
-        shut = self._resting(law, estimate, wanted, arrived=time >= plan.duration)
+        shut = self._resting(law, estimate, wanted, arrived=arrived)
         opening = 0.0 if shut else self.drive.opening(wanted, oil)
         given = self.drive.velocity(opening, oil) - from_plan
         after = self._moved(state, estimate, given, opening, inputs)
@@ -217,7 +218,7 @@ class Lqg:
             float(estimate[law.flow]),
             float(estimate[law.force]) * plan.stiffness,
             state.payload,
-            float(law.deflection @ estimate[: law.modes]),
+            float(law.deflection @ self._off(state, estimate)[: law.modes]),
         )
         return after, outputs
 
@@ -319,7 +320,9 @@ class Lqg:
         allowance = self.parameters.allowance
         return planned(boom, self.drive, start, move, allowance)
 
-    def _corrected(self, state: LqgState, inputs: LqgInputs, target: Target) -> Array:
+    def _corrected(
+        self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
+    ) -> Array:
         """Return x corrected by what is measured."""
         law = state.regulator
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
@@ -329,7 +332,8 @@ class Lqg:
             inputs.deflection - bending,
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
-        return state.estimate + law.kalman @ (measured - law.C @ state.estimate)
+        gain = law.kalman_at_rest if arrived else law.kalman
+        return state.estimate + gain @ (measured - law.C @ state.estimate)
 
     def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""
@@ -341,11 +345,13 @@ class Lqg:
         law = state.regulator
         off = np.append(estimate[: law.controlled], np.array(state.past) + estimate[law.flow])
         off[law.controlled - 1] -= estimate[law.force]
+        off[: law.controlled] -= law.held * estimate[law.load]
         return off
 
     def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
         """Tell whether the valve stays shut."""
-        p, q = self.parameters, estimate[: law.modes]
+        p = self.parameters
+        q = estimate[: law.modes] - law.held[: law.modes] * estimate[law.load]
         if not arrived:
             return abs(wanted) < p.standstill
         quiet = abs(law.deflection @ q) < p.rest_deflection

@@ -2,10 +2,11 @@
 
 With s = F / k_h, metres of oil, deviations from a plan obey
 
-    q'' + D q' + K q = J r k_h (s - f) + (F_0 dr/dalpha J + W sin(alpha)) J^T q
+    q'' + D q' + K q = J r k_h (s - f) + psi p + (F_0 dr/dalpha J + W sin(alpha)) J^T q
     s' = u + d - r J^T q'
 
-f: unknown force, friction for one; d: unknown flow; both change slowly. u acts late.
+f: unknown force on the piston, friction for one; d: unknown flow; p: unknown force at the TCP, a
+load that came or went; all change slowly. psi: the TCP's displacement per q. u acts late.
 """
 
 import math
@@ -37,6 +38,8 @@ class RegulatorParameters:
     modes: int = quantity("1", 2, 16, "of the boom in the model", default=3)
     delay: float = quantity("s", 0.0, 0.2, "from measurement to valve current", default=0.0)
     flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=1e-4)
+    load_drift: float = quantity("N", 1e-3, 1e6, "of p, at rest", default=5.0)
+    moving_load_drift: float = quantity("N", 1e-3, 1e6, "of p, moving", default=0.2)
     force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=1e-5)
     velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=1e-3)
     angle_noise: float = quantity(
@@ -54,12 +57,13 @@ class RegulatorParameters:
 
 @dataclass(frozen=True, eq=False)
 class Regulator:
-    """x(k+1) = A x + B [u(k), u(k-1) ...], y = C x, with x = (q, q', s, f, d).
+    """x(k+1) = A x + B [u(k), u(k-1) ...], y = C x, with x = (q, q', s, f, d, p).
 
-    modes: m in q. A: (n, n), n = 2 m + 3. B: (n, l + 1), for u now and l past ones. C: (3, n):
-    joint angle, rad, bending, rad, s, m. kalman: (n, 3). feedback: (2 m + 1 + l,), on (q, q', s)
-    and the past u: w = (q, q', s, past u), w(k+1) = extended w + driven u. stage, cost: matrices of
-    the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
+    modes: m in q. A: (n, n), n = 2 m + 4. B: (n, l + 1), for u now and l past ones. C: (3, n):
+    joint angle, rad, bending, rad, s, m. kalman, kalman_at_rest: (n, 3). feedback:
+    (2 m + 1 + l,), on w = (q, q', s, past u); w(k+1) = extended w + driven u. stage, cost:
+    matrices of the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
+    held: (2 m + 1,) where (q, q', s) rests under p = 1 N, the joint in its place.
     """
 
     modes: int
@@ -67,6 +71,7 @@ class Regulator:
     B: Array
     C: Array
     kalman: Array
+    kalman_at_rest: Array
     feedback: Array
     extended: Array
     driven: Array
@@ -74,10 +79,11 @@ class Regulator:
     cost: Array
     deflection: Array
     position: Array
+    held: Array
 
     @property
     def controlled(self) -> int:
-        """Return how many states the feedback acts on: all but f and d."""
+        """Return how many states the feedback acts on: all but f, d and p."""
         return 2 * self.modes + 1
 
     @property
@@ -94,6 +100,11 @@ class Regulator:
     def flow(self) -> int:
         """Return the index of d."""
         return 2 * self.modes + 2
+
+    @property
+    def load(self) -> int:
+        """Return the index of p."""
+        return 2 * self.modes + 3
 
 
 def regulator(
@@ -118,7 +129,8 @@ def regulator(
         A=A,
         B=B,
         C=C,
-        kalman=_kalman(A, B, C, stiffness, p),
+        kalman=_kalman(A, B, C, stiffness, p, p.moving_load_drift),
+        kalman_at_rest=_kalman(A, B, C, stiffness, p, p.load_drift),
         feedback=feedback,
         extended=extended,
         driven=driven[:, 0],
@@ -126,6 +138,7 @@ def regulator(
         cost=cost,
         deflection=boom.deflection[:m],
         position=boom.tip[:m],
+        held=_held(continuous, boom.joint[:m], m),
     )
 
 
@@ -137,7 +150,7 @@ def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Arr
     ahead, behind = (piston_velocity(1.0, angle + d, linkage) for d in (SLOPE_STEP, -SLOPE_STEP))
     force = boom.holding_torque * math.cos(angle) / arm
     stiffness = drive.stiffness(stroke)
-    joint, n = boom.joint[:m], 2 * m + 3
+    joint, n = boom.joint[:m], 2 * m + 4
     follower = joint * force * (ahead - behind) / (2.0 * SLOPE_STEP)
     follower = follower + boom.weight[:m] * math.sin(angle)
     model = np.zeros((n, n + 1))
@@ -146,9 +159,20 @@ def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Arr
     model[m : 2 * m, m : 2 * m] = -np.diag(boom.damping[:m])
     model[m : 2 * m, 2 * m] = joint * arm * stiffness
     model[m : 2 * m, 2 * m + 1] = -joint * arm * stiffness
+    model[m : 2 * m, 2 * m + 3] = boom.tip[:m]
     model[2 * m, m : 2 * m] = -arm * joint
     model[2 * m, 2 * m + 2] = model[2 * m, n] = 1.0
     return model, stiffness
+
+
+def _held(continuous: Array, joint: Array, m: int) -> Array:
+    """Return (q, q', s), (2 m + 1,), at rest under p = 1 N with the joint's angle as it was."""
+    equations = np.zeros((m + 1, m + 1))
+    equations[:m, :m] = continuous[m : 2 * m, :m]
+    equations[:m, m] = continuous[m : 2 * m, 2 * m]
+    equations[m, :m] = joint
+    found = np.linalg.solve(equations, np.append(-continuous[m : 2 * m, 2 * m + 3], 0.0))
+    return np.concatenate([found[:m], np.zeros(m), found[m:]])
 
 
 def _sampled(continuous: Array, period: float, late: float) -> tuple[Array, Array]:
@@ -179,11 +203,14 @@ def _with_past(A: Array, B: Array, m: int) -> tuple[Array, Array]:
     return extended, driven
 
 
-def _kalman(A: Array, B: Array, C: Array, stiffness: float, p: RegulatorParameters) -> Array:
+def _kalman(  # noqa: PLR0913, PLR0917 (one linear system)
+    A: Array, B: Array, C: Array, stiffness: float, p: RegulatorParameters, load_drift: float
+) -> Array:
     driven = B.sum(axis=1)
     noise = p.velocity_noise**2 * np.outer(driven, driven) + FLOOR * np.eye(len(A))
-    noise[-2, -2] += p.force_drift**2
-    noise[-1, -1] += p.flow_drift**2
+    noise[-3, -3] += p.force_drift**2
+    noise[-2, -2] += p.flow_drift**2
+    noise[-1, -1] += load_drift**2
     sensors = np.diag([p.angle_noise, p.bending_noise, p.force_noise / stiffness]) ** 2
     P = solve_discrete_are(A.T, C.T, noise, sensors)
     return np.asarray(np.linalg.solve(C @ P @ C.T + sensors, C @ P).T)

@@ -14,7 +14,15 @@ from scipy.interpolate import CubicSpline
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_control.arm import JOINTS, Arm
 from emir_control.inverse import Ranges, ReachError, follow
-from emir_control.trajectory import AwayAndBack, Timing, TrajectoryParameters, distance_of
+from emir_control.trajectory import (
+    AwayAndBack,
+    Motion,
+    Reference,
+    Timing,
+    TrajectoryParameters,
+    distance_of,
+)
+from emir_control.waypoints import Along, Axis, Waypoints, curve
 
 Array = NDArray[np.float64]
 
@@ -86,7 +94,7 @@ class RobotTrajectoryState(NamedTuple):
     """Where the trajectory stands."""
 
     path: Path
-    timing: AwayAndBack
+    timing: Motion
     ticks: int  # control periods since the start
 
 
@@ -128,6 +136,33 @@ class RobotTrajectory:
         """Return the reference of this control period of dt, s."""
         way = state.timing.at(state.ticks * dt)
         return state._replace(ticks=state.ticks + 1), state.path.at(way.stroke, way.velocity)
+
+    def held(self, state: RobotTrajectoryState, dt: float) -> RobotTrajectoryState:
+        """Return the state that comes to rest on its path and stays there."""
+        return state._replace(timing=state.timing.held(state.ticks * dt), ticks=0)
+
+    def follow(
+        self, state: RobotTrajectoryState, points: Waypoints, dt: float
+    ) -> RobotTrajectoryState:
+        """Return the state that follows waypoints of the six joints. Raises WaypointError."""
+        _, now = self.step(state, RobotTrajectoryInputs(np.empty(0)), dt)
+        begin = [Reference(*map(float, pair)) for pair in zip(*now[:2], strict=True)]
+        strokes = curve(points, self._axes(), begin)
+        places = [self.arm.tcp(self._angles(row)) for row in strokes(strokes.x)]
+        path = Path(strokes, CubicSpline(strokes.x, np.array(places)))
+        return RobotTrajectoryState(path, Along(float(strokes.x[-1])), 0)
+
+    def _angles(self, strokes: Array) -> Array:
+        pairs = zip(self.linkages, strokes.tolist(), strict=True)
+        return np.array([of.angle(stroke) for of, stroke in pairs])
+
+    def _axes(self) -> list[Axis]:
+        """Return the joints by their angles."""
+        axes = []
+        for k, (name, of) in enumerate(zip(JOINTS, self.linkages, strict=True)):
+            ends = (of.stroke(float(self.ranges.low[k])), of.stroke(float(self.ranges.high[k])))
+            axes.append(Axis(name, of, min(ends), max(ends), float(self.fastest[k])))
+        return axes
 
     def _line(self, start: Array) -> tuple[Path, Timing]:
         p, begin = self.line, self.arm.tcp(start)

@@ -25,6 +25,7 @@ class Move(NamedTuple):
     distance: float  # m
 
 
+LONG = 1e6  # s
 NO_MOVE = Move(-math.inf, 0.0, 0.0)
 
 
@@ -101,6 +102,7 @@ class TrajectoryState(NamedTuple):
 
     start: float  # stroke at which it started, m
     ticks: int  # control periods since
+    motion: "Motion | None" = None  # in the trajectory's place
 
 
 class TrajectoryInputs(NamedTuple):
@@ -109,8 +111,72 @@ class TrajectoryInputs(NamedTuple):
     stroke: float  # measured stroke, m: a trajectory starts where the machine stands
 
 
+class Motion:
+    """What is wanted over time, stepped in control periods. A subclass says the first three."""
+
+    @property
+    def duration(self) -> float:
+        """Return the time until it rests, s."""
+        raise NotImplementedError
+
+    def at(self, time: float, start: float = 0.0) -> Reference:
+        """Return the reference `time` s after the beginning at `start`, m."""
+        raise NotImplementedError
+
+    def held(self, time: float, start: float = 0.0) -> "Motion":
+        """Return what brings it to rest from that time, s, on; its own time begins at 0 again."""
+        raise NotImplementedError
+
+    def initial(self, inputs: TrajectoryInputs) -> TrajectoryState:
+        """Return the state that starts at the measured stroke."""
+        return TrajectoryState(inputs.stroke, 0)
+
+    def step(
+        self, state: TrajectoryState, inputs: TrajectoryInputs, dt: float
+    ) -> tuple[TrajectoryState, Reference]:
+        """Return the reference of this control period of dt, s."""
+        reference = self.at(state.ticks * dt, state.start)
+        return state._replace(ticks=state.ticks + 1), reference
+
+    def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
+        """Return the strokes, m, of the `count` periods that follow the next step's own."""
+        times = ((state.ticks + k) * dt for k in range(1, count + 1))
+        return tuple(self.at(time, state.start).stroke for time in times)
+
+    def move(self, state: TrajectoryState, dt: float) -> Move:
+        """Return the move under way or to come; here there is none, and long no other."""
+        return Move(-LONG, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
-class AwayAndBack:
+class Braking(Motion):
+    """From a reference to rest. deceleration: m/s^2."""
+
+    begin: Reference
+    deceleration: float
+
+    @property
+    def duration(self) -> float:
+        """Return the time until it rests, s."""
+        return abs(self.begin.velocity) / self.deceleration
+
+    def at(self, time: float, start: float = 0.0) -> Reference:
+        """Return the reference `time` s after the braking began; start: has no meaning here."""
+        stroke, velocity = self.begin
+        slope = math.copysign(self.deceleration, velocity)
+        since = min(time, self.duration)
+        return Reference(
+            stroke + velocity * since - 0.5 * slope * since**2,
+            velocity - slope * since if since == time else 0.0,
+        )
+
+    def held(self, time: float, start: float = 0.0) -> "Braking":
+        """Return the same braking from that time on."""
+        return Braking(self.at(time), self.deceleration)
+
+
+@dataclass(frozen=True)
+class AwayAndBack(Motion):
     """Trapezoidal dh_d/dt away and back, and its integral h_d."""
 
     parameters: TrajectoryParameters | Timing
@@ -125,22 +191,6 @@ class AwayAndBack:
     def _move(self) -> Trapezoid:
         p = self.parameters
         return Trapezoid(p.distance, p.speed, p.ramp)
-
-    def initial(self, inputs: TrajectoryInputs) -> TrajectoryState:
-        """Return the state that starts at the measured stroke."""
-        return TrajectoryState(inputs.stroke, 0)
-
-    def step(
-        self, state: TrajectoryState, inputs: TrajectoryInputs, dt: float
-    ) -> tuple[TrajectoryState, Reference]:
-        """Return the reference of this control period of dt, s."""
-        reference = self.at(state.ticks * dt, state.start)
-        return TrajectoryState(state.start, state.ticks + 1), reference
-
-    def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
-        """Return the strokes, m, of the `count` periods that follow the next step's own."""
-        times = ((state.ticks + k) * dt for k in range(1, count + 1))
-        return tuple(self.at(time, state.start).stroke for time in times)
 
     def move(self, state: TrajectoryState, dt: float) -> Move:
         """Return the move of the next step's own time; before the way back, that back."""
@@ -157,6 +207,10 @@ class AwayAndBack:
         away = self._move.at(time - p.delay)
         back = self._move.at(time - p.delay - self._move.duration - p.pause)
         return Reference(start + away.stroke - back.stroke, away.velocity - back.velocity)
+
+    def held(self, time: float, start: float = 0.0) -> Braking:
+        """Return what brings it to rest as its own ramps do."""
+        return Braking(self.at(time, start), self.parameters.speed / self.parameters.ramp)
 
 
 def named(name: str, parameters: TrajectoryParameters) -> AwayAndBack:

@@ -1,9 +1,14 @@
 """What a node says about itself on /diagnostics, where ROS's tools look for it, and in its log."""
 
+from collections import Counter
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
 
 REPEAT = 1.0  # s, after which the last word is said again: whoever came late hears it
 
@@ -16,11 +21,39 @@ class Level(IntEnum):
     ERROR = 2
 
 
+class Beat:
+    """How regularly something comes that is due every period, s."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._last: float | None = None
+        self._jitter = 0.0
+        self._missed = 0
+
+    def tick(self, now: float) -> None:
+        """Note that it has come, at a time in s."""
+        gap = self._period if self._last is None else now - self._last
+        self._last = now
+        self._jitter = max(self._jitter, abs(gap - self._period))
+        self._missed += max(0, round(gap / self._period) - 1)
+
+    def values(self) -> dict[str, str]:
+        """Return the largest deviation since it was last asked for, and all missed periods."""
+        jitter, self._jitter = self._jitter, 0.0
+        return {"jitter [ms]": f"{jitter * 1e3:.3f}", "missed periods": str(self._missed)}
+
+
 class Diagnostics:
-    """The one status of a node: said when it changes, and in real time again every second."""
+    """The one status of a node: said when it changes, and in real time again every second.
+
+    counts: what has happened how often since the start; it and what `figures` returns are the
+    status's values.
+    """
 
     def __init__(self, node: Node, *, repeat: bool) -> None:
         self._node = node
+        self.counts: Counter[str] = Counter()
+        self.figures: Callable[[], Mapping[str, str]] = dict
         self._said: tuple[Level, str] | None = None
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         if repeat:
@@ -48,5 +81,7 @@ class Diagnostics:
         array.header.stamp = self._node.get_clock().now().to_msg()
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(level=bytes([level]), name=name, message=message)
+        found = {**self.figures(), **{key: str(n) for key, n in sorted(self.counts.items())}}
+        status.values = [KeyValue(key=key, value=value) for key, value in found.items()]
         array.status.append(status)
         self._publisher.publish(array)

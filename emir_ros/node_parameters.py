@@ -84,11 +84,18 @@ def declare(node: Node, name: str, default: Any, description: str) -> Any:
 
 
 def reject_unknown(node: Node) -> None:
-    """Raise ParameterError if a value was given for a parameter that the node does not have."""
+    """Raise ParameterError if a value was given for a parameter that the node does not have.
+
+    A topic's quality of service may be given to all nodes, and in lock step to none.
+    """
     # rclpy keeps the values from command line and files here and offers no other way to them
     for name in node._parameter_overrides:  # noqa: SLF001
-        standard = name.startswith("qos_overrides.") or name == "start_type_description_service"
-        if not standard and not node.has_parameter(name):
+        if node.has_parameter(name) or name == "start_type_description_service":
+            continue
+        of_a_topic = name.startswith("qos_overrides.")
+        if of_a_topic and node.get_parameter("lockstep").value:
+            raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
+        if not of_a_topic:  # of a topic that another node has
             raise ParameterError(f"{node.get_name()}: {name}: there is no such parameter")
 
 

@@ -16,11 +16,11 @@ from emir_msgs_py import conversions
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, RECORDED, ROBOT
 from emir_ros import qos
-from emir_ros.diagnostics import Level
+from emir_ros.diagnostics import Beat, Level
 from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachine
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
-from emir_ros.shell import NodeError, Shell, Signals
+from emir_ros.shell import NodeError, Shell, Signals, pressures
 from emir_ros.wire import Wire, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
@@ -65,10 +65,8 @@ class PlantNode(Shell):
         self._command: tuple[int, Signals] | None = None
         self._recorded = -1
         profile = qos.requested(self._valves, lockstep=self.lockstep)
-        message = conversions.message_class(self._valves.type)
         self._command_wire = Wire(self._valves)
-        name = self._valves.name
-        self.create_subscription(message, name, self._on_command, profile, raw=True)
+        self.hear(self._valves, self._on_command, profile)
         if self.lockstep:
             self._start_lockstep()
         else:
@@ -161,16 +159,25 @@ class PlantNode(Shell):
     def _start_realtime(self) -> None:
         self._command_received = -math.inf
         self._started = time.monotonic()
+        self._beat = Beat(PLANT_PERIOD_NS * 1e-9)
+        self.diagnostics.figures = self._figures
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
 
+    def _figures(self) -> dict[str, str]:
+        return self._beat.values() | pressures(self.machine.signals(self.tick))
+
     def _on_timer(self) -> None:
+        self._beat.tick(self.seconds())
         due = int((time.monotonic() - self._started) / (PLANT_PERIOD_NS * 1e-9))
         if due - self.tick > CONTROL_PERIOD_NS // PLANT_PERIOD_NS:
             self.get_logger().warning(
                 f"{due - self.tick} plant periods late", throttle_duration_sec=2.0
             )
         command = self._fresh_command()
+        self.diagnostics.counts["periods without fresh inputs"] += command is self._shut
+        saturated = max(map(abs, command.values())) >= 1.0
+        self.diagnostics.counts["periods saturated"] += saturated
         while self.tick < due:  # a late timer catches up
             self._step(command)
         self._publish_sensors(self.get_clock().now().nanoseconds)

@@ -3,16 +3,20 @@
 from typing import Any
 
 import yaml
+from rclpy.duration import Duration
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
 )
+from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
 
-from emir_msgs_py.topics import Topic
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
 
 DEPTH = 64  # plant periods: half a second of sensor data
+
+LEASE = Duration(seconds=1.0)  # after which a publisher without sign of life counts as dead
 
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # how rosbag2 writes "no limit"
 
@@ -30,6 +34,33 @@ def offered(*, lockstep: bool) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if lockstep else DurabilityPolicy.VOLATILE,
     )
+
+
+def promised(topic: Topic, *, lockstep: bool) -> QoSProfile:
+    """Return `offered`, in real time with a deadline of two periods and a sign of life."""
+    profile = offered(lockstep=lockstep)
+    if not lockstep:
+        period = PLANT_PERIOD_NS if topic.every == "plant" else CONTROL_PERIOD_NS
+        profile.deadline = Duration(nanoseconds=2 * period)
+        profile.liveliness_lease_duration = LEASE
+    return profile
+
+
+def overridable(*, lockstep: bool) -> QoSOverridingOptions | None:
+    """Return what parameters `qos_overrides.<topic>...` may change: nothing in lock step.
+
+    A subscription may ask for a deadline and for signs of life. By itself none does: it would then
+    hear nobody who promises none, such as `ros2 topic pub` or `ros2 bag play`.
+    """
+    if lockstep:
+        return None
+    kinds = QoSPolicyKind
+    return QoSOverridingOptions(
+        (
+            kinds.HISTORY, kinds.DEPTH, kinds.RELIABILITY, kinds.DURABILITY,
+            kinds.DEADLINE, kinds.LIVELINESS_LEASE_DURATION,
+        )
+    )  # fmt: skip
 
 
 def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:

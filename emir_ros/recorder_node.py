@@ -141,8 +141,7 @@ class RecorderNode(Shell):
             else:
                 self._write(full_name, data, self.get_clock().now().nanoseconds, stamp)
 
-        kind = conversions.message_class(topic.type)
-        self.create_subscription(kind, topic.name, receive, profile, raw=True)
+        self.hear(topic, receive, profile)
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data

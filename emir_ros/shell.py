@@ -6,12 +6,14 @@ runs as fast as it can and the result does not depend on how fast that is.
 """
 
 import math
+import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 
 from emir_analysis.node_controls import NodeControl, Stepping
@@ -30,11 +32,12 @@ from emir_msgs_py.topics import (
 )
 from emir_plant.plant import SimulationError
 from emir_ros import qos
-from emir_ros.diagnostics import Diagnostics, Level
+from emir_ros.diagnostics import Beat, Diagnostics, Level
 from emir_ros.node_parameters import declare
 from emir_ros.wire import Wire, stamp_ns
 
 if TYPE_CHECKING:
+    from rclpy.qos import QoSProfile
     from rclpy.time import Time
 
 Signals = dict[str, float]
@@ -68,17 +71,49 @@ class Shell(Node):
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
         self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
-        self._offer(known[self.model])
         self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
+        self._offer(known[self.model])
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
         for topic in outputs:
-            publisher = self._publisher(topic.type, topic.name)
-            self._outputs[topic.name] = (topic, Wire(topic), publisher)
+            self._outputs[topic.name] = (topic, Wire(topic), self._publisher(topic))
 
-    def _publisher(self, type_name: str, name: str) -> Any:
-        kind = conversions.message_class(type_name)
-        return self.create_publisher(kind, name, qos.offered(lockstep=self.lockstep))
+    def _publisher(self, topic: Topic) -> Any:
+        def late(_: Any) -> None:
+            self.diagnostics.counts[f"{topic.name}: own deadline missed"] += 1
+
+        return self.create_publisher(
+            conversions.message_class(topic.type),
+            topic.name,
+            qos.promised(topic, lockstep=self.lockstep),
+            event_callbacks=None if self.lockstep else PublisherEventCallbacks(deadline=late),
+            qos_overriding_options=qos.overridable(lockstep=self.lockstep),
+        )
+
+    def hear(self, topic: Topic, receive: Callable[[bytes], None], profile: "QoSProfile") -> Any:
+        """Subscribe to a topic's messages as bytes; counts who comes and goes, and deadlines."""
+
+        def late(_: Any) -> None:
+            self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
+
+        def alive(change: Any) -> None:
+            if change.not_alive_count_change > 0:
+                self.diagnostics.counts[f"{topic.name}: publisher not alive"] += 1
+
+        def matched(change: Any) -> None:
+            if change.current_count_change < 0:
+                self.diagnostics.counts[f"{topic.name}: publisher lost"] += 1
+
+        events = SubscriptionEventCallbacks(deadline=late, liveliness=alive, matched=matched)
+        return self.create_subscription(
+            conversions.message_class(topic.type),
+            topic.name,
+            receive,
+            profile,
+            event_callbacks=None if self.lockstep else events,
+            qos_overriding_options=qos.overridable(lockstep=self.lockstep),
+            raw=True,
+        )
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
@@ -126,8 +161,30 @@ class Shell(Node):
         clock = None if simulated else Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(period, callback, clock=clock)
 
+    def seconds(self) -> float:
+        """Return the time of the clock that timers run on, s."""
+        if self.get_parameter("use_sim_time").value:
+            return self.get_clock().now().nanoseconds * 1e-9
+        return time.monotonic()
+
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
+
+
+def pressures(signals: Mapping[str, float]) -> dict[str, str]:
+    """Return the measured pressures among the signals as texts with their unit."""
+    return {
+        f"{name} [bar]": f"{value * 1e-5:.2f}"
+        for name, value in signals.items()
+        if "pressure_l" in name and "true" not in name
+    }
+
+
+def is_saturated(signals: Mapping[str, float]) -> bool:
+    """Return whether a signal says that a valve or a command is at its limit."""
+    return any(
+        value == 1.0 for name, value in signals.items() if name.endswith(("saturated", "limited"))
+    )
 
 
 class ControlNode(Shell):
@@ -176,6 +233,9 @@ class ControlNode(Shell):
                 self._hear_selector()
         self._offer(outputs)
         if not self.lockstep:
+            self._beat = Beat(self._period * 1e-9)
+            self._shown: Signals = {}
+            self.diagnostics.figures = self._figures
             self.start_timer(self._period * 1e-9, self._on_timer)
 
     def standing_by(self, control: NodeControl) -> Stepping:
@@ -213,9 +273,7 @@ class ControlNode(Shell):
             elif stamp_ns(data) % self._period == 0:
                 self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
 
-        kind = conversions.message_class(topic.type)
-        profile = qos.requested(topic, lockstep=self.lockstep)
-        self.create_subscription(kind, topic.name, receive, profile, raw=True)
+        self.hear(topic, receive, qos.requested(topic, lockstep=self.lockstep))
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
         complete = self._pending.setdefault(stamp, {})
@@ -238,12 +296,17 @@ class ControlNode(Shell):
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()
+        self._beat.tick(self.seconds())
         missing = self.missing()
         if not missing:
             fresh = [s for t, s in self._latest.values() if self._is_fresh(t, now)]
             self._run(now.nanoseconds, fresh)
         else:
+            self.diagnostics.counts["periods without fresh inputs"] += 1
             self.without(missing)
+
+    def _figures(self) -> dict[str, str]:
+        return self._beat.values() | pressures(self._shown)
 
     def missing(self) -> list[str]:
         """Return what keeps a period from running, in words; nothing: all is there."""
@@ -273,7 +336,11 @@ class ControlNode(Shell):
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
-        self._publish_all(stamp, self.control(signals, self._period * 1e-9))
+        outputs = self.control(signals, self._period * 1e-9)
+        self._publish_all(stamp, outputs)
+        if not self.lockstep:
+            self._shown = signals
+            self.diagnostics.counts["periods saturated"] += is_saturated(outputs)
         bad = [name for name, value in signals.items() if not math.isfinite(value)]
         if bad:
             verb = "is" if len(bad) == 1 else "are"

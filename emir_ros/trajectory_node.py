@@ -1,31 +1,46 @@
-"""trajectory_node: the desired motion of the pistons, from where the machine stands."""
+"""trajectory_node: the desired motion of the pistons, from where the machine stands.
+
+`~/hold` brings the reference to rest where it is, `~/stop` does and takes no JointTrajectory
+afterwards, `~/start` begins the named trajectory anew. What comes between two periods acts from the
+next one on.
+"""
 
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import NodeControl, TrajectoryControl
+import numpy as np
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from emir_analysis.node_controls import Guidable, TrajectoryControl
 from emir_analysis.robot_controls import RobotTrajectoryControl
 from emir_analysis.robot_setup import path_parameters, trajectory
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
+from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
+
+RELIABLE = 10  # depth of JOINT_TRAJECTORY
+JOINT_TRAJECTORY = "joint_trajectory"
 
 
 class TrajectoryNode(ControlNode):
     """cylinder_states -> cylinder_reference, cylinder_preview.
 
-    Of the whole robot: joint_states -> cylinder_reference, tcp_reference.
+    Of the whole robot: joint_states -> cylinder_reference, tcp_reference. joint_trajectory takes
+    the named trajectory's place.
     """
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         mine, six = TrajectoryControl, RobotTrajectoryControl
         super().__init__("trajectory_node", mine.inputs, mine.outputs, arguments, six)
         known = "lift-lower, lower-lift or hold; of the whole robot also line"
-        name = declare(self, "trajectory", "lift-lower", known)
+        name: str = declare(self, "trajectory", "lift-lower", known)
         move = declare_tree(self, TrajectoryParameters())
-        self.law: NodeControl
+        self.law: Guidable
         if self.model == ROBOT:
             sheet = declare_robot(self)
             path = declare_tree(self, path_parameters(sheet))
@@ -34,11 +49,83 @@ class TrajectoryNode(ControlNode):
             self.law = mine(named(name, move))
         self.state: Any = None
         reject_unknown(self)
+        self._name = self._doing = name
+        self._stopped = False
+        self.waypoints_heard = 0  # messages, rejected ones too
+        for verb in (self.start, self.hold, self.stop):
+            self.create_service(Trigger, f"~/{verb.__name__}", self._answer(verb))
+        self.create_subscription(JointTrajectory, JOINT_TRAJECTORY, self._on_waypoints, RELIABLE)
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the reference of this control period and of the next ones."""
         self.state, outputs = self.law.step(self.state, signals, dt)
         return outputs
+
+    def status(self) -> str:
+        """Return what is being done."""
+        return self._doing
+
+    def start(self) -> str:
+        """Begin the named trajectory where the machine stands."""
+        self.state, self._stopped, self._doing = None, False, self._name
+        return f"{self._name} begins"
+
+    def hold(self) -> str:
+        """Bring the reference to rest where it is."""
+        if self.state is None:
+            raise WaypointError("nothing moves yet")
+        self.state = self.law.held(self.state, self._period * 1e-9)
+        self._doing = "held"
+        return "comes to rest"
+
+    def stop(self) -> str:
+        """Hold, and take no waypoints until `start`."""
+        said = self.hold()
+        self._stopped, self._doing = True, "stopped"
+        return f"{said}; goes on after ~/start"
+
+    def _answer(self, verb: Any) -> Any:
+        def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.message, response.success = verb(), True
+            except WaypointError as error:
+                response.message = str(error)
+            return response
+
+        return serve
+
+    def _on_waypoints(self, message: JointTrajectory) -> None:
+        self.waypoints_heard += 1
+        try:
+            self._follow(_waypoints(message))
+        except WaypointError as error:
+            self.diagnostics.say(Level.WARN, f"{JOINT_TRAJECTORY} rejected: {error}")
+        else:
+            self._doing = f"follows {JOINT_TRAJECTORY}"
+
+    def _follow(self, points: Waypoints) -> None:
+        if self._stopped:
+            raise WaypointError("stopped, goes on after ~/start")
+        if self.state is None:
+            raise WaypointError("no reference yet to begin at")
+        self.state = self.law.follow(self.state, points, self._period * 1e-9)
+
+
+def _waypoints(message: JointTrajectory) -> Waypoints:
+    times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in message.points]
+    return Waypoints(
+        list(message.joint_names),
+        np.array(times),
+        _table([p.positions for p in message.points], "positions"),
+        _table([p.velocities for p in message.points], "velocities"),
+    )
+
+
+def _table(rows: list[Any], what: str) -> Any:
+    """Return numbers by point and joint. Raises WaypointError for rows of different lengths."""
+    if len({len(row) for row in rows}) > 1:
+        raise WaypointError(f"{what}: not as many in every point")
+    return np.array([list(row) for row in rows])
 
 
 def main() -> None:

@@ -1,0 +1,131 @@
+"""What nodes say of themselves in real time: values, lost publishers, deadlines, overrides."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from emir_common.quantity import ParameterError
+from emir_msgs_py.topics import JOINT_STATES, VALVE_COMMAND, VELOCITY_COMMAND
+from emir_ros.diagnostics import Beat
+from emir_ros.force_loop_node import ForceLoopNode
+from emir_ros.plant_node import PlantNode
+from emir_ros.trajectory_node import TrajectoryNode
+
+
+class Graph:
+    """Nodes in this process and the last values that each has said."""
+
+    def __init__(self, nodes: list[Node]) -> None:
+        self.values: dict[str, dict[str, str]] = {}
+        self.listener = Node("listener")
+        self.listener.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 10)
+        self.nodes = nodes
+        self.executor = SingleThreadedExecutor()
+        for node in (self.listener, *nodes):
+            self.executor.add_node(node)
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.values[status.name] = {entry.key: entry.value for entry in status.values}
+
+    def until(self, condition: Callable[[], object]) -> None:
+        """Spin until the condition holds."""
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline, self.values
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def lose(self, node: Node) -> None:
+        """Let a node die."""
+        self.executor.remove_node(node)
+        node.destroy_node()
+        self.nodes.remove(node)
+
+    def count(self, node: str, key: str) -> int:
+        """Return how often a node says that something has happened."""
+        return int(self.values.get(f"/{node}", {}).get(key, "0"))
+
+
+@contextmanager
+def _graph(*makes: Callable[[], Node]) -> Iterator[Graph]:
+    rclpy.init()
+    graph = Graph([make() for make in makes])
+    try:
+        yield graph
+    finally:
+        for node in (graph.listener, *graph.nodes):
+            node.destroy_node()
+        rclpy.shutdown()
+
+
+def test_a_beat_knows_jitter_and_missed_periods() -> None:
+    beat = Beat(0.1)
+    for now in (5.0, 5.1, 5.23, 5.3, 5.7, 5.8):
+        beat.tick(now)
+    assert beat.values() == {"jitter [ms]": "300.000", "missed periods": "3"}
+    beat.tick(5.9)
+    assert float(beat.values()["jitter [ms]"]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_diagnostics_hold_what_a_tool_wants_to_show() -> None:
+    asked = f"qos_overrides./{VELOCITY_COMMAND.name}.subscription"
+    loop = ["--ros-args", "-p", f"{asked}.deadline:=64000000"]
+    loop += ["-p", f"{asked}.liveliness_lease_duration:=1000000000"]
+    command = [sys.executable, "-P", "-m", "emir_ros.cascade_node"]
+    makes = (PlantNode, TrajectoryNode, lambda: ForceLoopNode(loop))
+    with subprocess.Popen(command) as cascade, _graph(*makes) as graph:
+        try:
+            nodes = ["/cascade_node", *(f"/{node.get_name()}" for node in graph.nodes)]
+            regular = {"jitter [ms]", "missed periods"}
+            both = {"pressure_lifting [bar]", "pressure_lowering [bar]"}
+            graph.until(lambda: all(regular <= graph.values.get(n, {}).keys() for n in nodes))
+            graph.until(lambda: both <= graph.values["/force_loop_node"].keys())
+            assert both | {"periods saturated"} <= graph.values["/plant_node"].keys()
+            lifting = graph.values["/plant_node"]["pressure_lifting [bar]"]
+            assert 20.0 < float(lifting) < 250.0
+            stale = graph.count("force_loop_node", "periods without fresh inputs")
+        finally:
+            os.kill(cascade.pid, signal.SIGKILL)
+        cascade.wait()
+        name = VELOCITY_COMMAND.name
+        graph.until(lambda: graph.count("force_loop_node", f"{name}: publisher not alive"))
+        graph.until(lambda: graph.count("force_loop_node", f"{name}: deadline missed"))
+        graph.until(lambda: graph.count("force_loop_node", "periods without fresh inputs") > stale)
+        graph.lose(graph.nodes[0])
+        lost = f"{JOINT_STATES.name}: publisher lost"
+        graph.until(lambda: graph.count("force_loop_node", lost))
+
+
+def test_a_topics_quality_is_overridden_by_parameters() -> None:
+    of = f"qos_overrides./{VALVE_COMMAND.name}.publisher"
+    wanted = ("reliability:=best_effort", "durability:=transient_local", "depth:=3")
+    words = [f"{of}.{entry}" for entry in wanted]
+    given = ["--ros-args", *(word for entry in words for word in ("-p", entry))]
+    with _graph(lambda: ForceLoopNode(given)) as graph:
+        there = graph.listener.get_publishers_info_by_topic
+        graph.until(lambda: there(VALVE_COMMAND.name))
+        (info,) = there(VALVE_COMMAND.name)
+        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        assert graph.nodes[0].get_parameter(f"{of}.depth").value == 3
+
+
+def test_lock_step_takes_no_override() -> None:
+    name = f"qos_overrides./{VALVE_COMMAND.name}.publisher.depth"
+    words = ["--ros-args", "-p", "lockstep:=true", "-p", f"{name}:=3"]
+    with _graph(), pytest.raises(ParameterError, match=f"{name}: fixed in lock step"):
+        ForceLoopNode(words)

@@ -58,6 +58,7 @@ LINKAGE = list(BALANCES).index("linkage")
 READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted signals
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend
 LAG_SMOOTHING = 0.05  # s, of pressures and deflection where a sensor's lag is undone
+EMPTY = 5.0  # times its noise: a lower pressure does not tell whether the chamber runs empty
 QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
@@ -98,6 +99,8 @@ class Balances:
         self._flow = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=1)
         self._turn = _Window(FORCE_WINDOW, FORCE_WINDOW, period, degree=2)
         self._mean = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=0)
+        low = shown[:, :2] < EMPTY * geometry.sensors.pressure_noise
+        self._filled = [self._mean(column.astype(float)) == 0.0 for column in low.T]
 
     @property
     def time(self) -> Array:
@@ -210,8 +213,8 @@ class Balances:
         return np.column_stack(
             [
                 self._turn(turning) * self._mean(self._force_per_turning),
-                self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]),
-                self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]),
+                self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]) * self._filled[0],
+                self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]) * self._filled[1],
                 self._mean(self._off_linkage),
                 self._mean(deflection - modelled.deflection),
             ]

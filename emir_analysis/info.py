@@ -12,6 +12,7 @@ from emir_analysis import bags
 
 DESCRIPTION = "emir"  # the metadata record in which the graph describes its run
 PARAMETERS = "emir.parameters"  # the one with the parameters of its nodes, JSON by node
+CHANGE = "emir.parameter_change"  # with a number behind it: one that was set during the run
 FIELDS = "fields"  # the channel metadata with path, unit and meaning by signal, JSON
 
 
@@ -39,6 +40,20 @@ class TopicInfo:
 
 
 @dataclass(frozen=True)
+class Change:
+    """A parameter that was set during the run. time: of the recording, ns. value: JSON."""
+
+    time: int
+    node: str
+    name: str
+    value: str
+
+    def as_metadata(self) -> dict[str, str]:
+        """Return it as texts by key."""
+        return {"time": str(self.time), "node": self.node, "name": self.name, "value": self.value}
+
+
+@dataclass(frozen=True)
 class Info:
     """about: the run's own description. unfinished: the files that were cut off.
 
@@ -50,6 +65,12 @@ class Info:
     topics: dict[str, TopicInfo]
     unfinished: list[Path] = field(default_factory=list)
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    changes: dict[str, Change] = field(default_factory=dict)
+
+    @property
+    def start(self) -> int:
+        """Return the first message's time, ns."""
+        return min((topic.first for topic in self.topics.values() if topic.count), default=0)
 
     @property
     def duration(self) -> float:
@@ -87,6 +108,9 @@ def _count(file: Path, found: Info) -> None:
         elif isinstance(record, Metadata) and record.name == PARAMETERS:
             values = {node: json.loads(text) for node, text in record.metadata.items()}
             found.parameters.update(values)
+        elif isinstance(record, Metadata) and record.name.startswith(CHANGE):
+            m = record.metadata  # by name: a split recording repeats it in every file
+            found.changes[record.name] = Change(int(m["time"]), m["node"], m["name"], m["value"])
 
 
 def text(found: Info) -> str:
@@ -95,6 +119,9 @@ def text(found: Info) -> str:
     lines = [f"{key}: {value}" for key, value in found.about.items() if key != "duration"]
     lines.append(f"recorded: {found.duration:.3f} s, {messages} messages")
     lines.append(f"file: {_state(found)}")
+    for change in found.changes.values():
+        at = (change.time - found.start) * 1e-9
+        lines.append(f"set at {at:.3f} s: {change.node} {change.name} = {change.value}")
     wide = max(map(len, found.topics), default=0)
     kinds = max((len(topic.type) for topic in found.topics.values()), default=0)
     for name, topic in sorted(found.topics.items()):

@@ -8,9 +8,12 @@ from emir_analysis.robot_controls import RobotCascadeControl
 from emir_analysis.robot_setup import cascade_parameters
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_msgs_py.topics import ROBOT
+from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
+
+LIVE = ("gain", "time_constant")
 
 
 class CascadeNode(ControlNode):
@@ -20,8 +23,15 @@ class CascadeNode(ControlNode):
         mine, six = CascadeControl, RobotCascadeControl
         super().__init__("cascade_node", mine.inputs, mine.outputs, arguments, six)
         robot = self.model == ROBOT
-        law = Cascade(declare_tree(self, cascade_parameters() if robot else CascadeParameters()))
-        self.law: Stepping = six(law) if robot else self.standing_by(mine(law))
+        default = cascade_parameters() if robot else CascadeParameters()
+        parameters = declare_tree(self, default, live=LIVE)
+
+        def tune(parameters: CascadeParameters) -> None:
+            law = Cascade(parameters)
+            self.law: Stepping = six(law) if robot else self.standing_by(mine(law))
+
+        tune(parameters)
+        LiveParameters(self, parameters, LIVE, tune)
         self.state: Any = None
         reject_unknown(self)
 

@@ -8,10 +8,12 @@ from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT
+from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_robot, declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
 
+LIVE = ("gain",)  # the prefilter has none of that name
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
 # A command is due every period. Looked for every plant period, its absence shuts the valve
 # within the period in which it was due.
@@ -31,11 +33,15 @@ class ForceLoopNode(ControlNode):
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         mine, six = ForceLoopControl, RobotForceLoopControl
         super().__init__("force_loop_node", mine.inputs, mine.outputs, arguments, six)
-        self.law: NodeControl
-        if self.model == ROBOT:
-            self.law = six(declare_tree(self, force_loops(declare_robot(self))))
-        else:
-            self.law = mine(ForceLoop(declare_tree(self, ForceLoopParameters())))
+        robot = self.model == ROBOT
+        default: Any = force_loops(declare_robot(self)) if robot else ForceLoopParameters()
+        parameters = declare_tree(self, default, live=LIVE)
+
+        def tune(parameters: Any) -> None:
+            self.law: NodeControl = six(parameters) if robot else mine(ForceLoop(parameters))
+
+        tune(parameters)
+        LiveParameters(self, parameters, LIVE, tune)
         self.state: Any = None
         reject_unknown(self)
         if not self.lockstep:

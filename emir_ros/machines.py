@@ -9,7 +9,7 @@ from rclpy.node import Node
 
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import check_ranges, quantity
-from emir_msgs_py.robot_topics import ROBOT_VALVE_COMMAND
+from emir_msgs_py.robot_topics import GROUND, ROBOT_VALVE_COMMAND
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CYLINDER_STATES,
@@ -20,12 +20,16 @@ from emir_msgs_py.topics import (
     VALVE_COMMAND,
     Topic,
 )
+from emir_plant import core
+from emir_plant.boom_urdf import bending, boom_urdf
 from emir_plant.parameters import cautions
 from emir_plant.plant import Plant
 from emir_plant.robot import require_pinocchio
+from emir_plant.robot.actuators import SIZE
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros.node_parameters import declare, declare_robot, declare_tree
+from emir_ros.picture import Picture
 from emir_ros.shell import Signals
 
 JOINT1_OUTPUTS = (
@@ -81,6 +85,9 @@ class Joint1Machine:
             node.get_logger().warning(line)
         self.state = self.plant.initial(start.initial_angle, pressure_lowering)
         self.truth = self.plant.outputs(self.state)
+        geometry = self.plant.machine.geometry
+        self._bending = bending(geometry)
+        self._picture = Picture(node, boom_urdf(geometry), self._positions)
 
     def step(self, commands: Signals, dt: float) -> None:
         """Go on by dt, s."""
@@ -92,7 +99,14 @@ class Joint1Machine:
         return reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
 
     def show(self, stamp: int) -> None:
-        """Publish nothing: joint 1 has no description."""
+        """Publish the joints of the description, stamped in ns."""
+        self._picture.publish(stamp)
+
+    def _positions(self) -> Signals:
+        names, angles = self._bending
+        modes = angles.shape[1]
+        position = angles @ self.state[core.MODES : core.MODES + modes]
+        return dict(zip(names, position.tolist(), strict=True))
 
 
 class RobotMachine:
@@ -108,7 +122,7 @@ class RobotMachine:
         require_pinocchio()
         from emir_analysis import robot_machine  # noqa: PLC0415 (needs Pinocchio)
         from emir_plant.robot.plant import RobotPlant  # noqa: PLC0415
-        from emir_ros.robot_picture import RobotPicture  # noqa: PLC0415
+        from emir_plant.robot.urdf import joint_positions, urdf  # noqa: PLC0415
 
         self._by_signals = robot_machine
         start = declare_tree(node, Start()).initial_angles
@@ -116,7 +130,13 @@ class RobotMachine:
         for line in cautions(self.plant.robot.main):
             node.get_logger().warning(line)
         self.state = self.plant.initial(start.angles, pressure_lowering)
-        self._picture = RobotPicture(node, self.plant.mechanics)
+        mechanics = self.plant.mechanics
+
+        def positions() -> Signals:
+            return joint_positions(mechanics, self.state[SIZE : SIZE + mechanics.size])
+
+        description = urdf(mechanics).replace('"world"', f'"{GROUND}"')  # as messages call it
+        self._picture = Picture(node, description, positions)
         self.truth = self.plant.outputs(self.state)
 
     def step(self, commands: Signals, dt: float) -> None:
@@ -130,7 +150,7 @@ class RobotMachine:
 
     def show(self, stamp: int) -> None:
         """Publish the joints of the description, stamped in ns."""
-        self._picture.publish(stamp, self.state)
+        self._picture.publish(stamp)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -14,19 +15,22 @@ from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.sheet import robot
+from emir_ros.live_parameters import is_live
 
 Tree = TypeVar("Tree")
 
 
-def declare_tree(node: Node, tree: Tree, without: str = "") -> Tree:
+def declare_tree(node: Node, tree: Tree, without: str = "", live: Collection[str] = ()) -> Tree:
     """Declare every quantity of the dataclass as a ROS parameter; return it as then set.
 
+    live: the last parts of those that may change while the node runs (`LiveParameters`).
     without: what the parameters' names leave out of the front of the quantities' paths. Raises
     ParameterError, naming node and parameter, for a value that is out of range.
     """
     values = {}
     for path, (about, default) in declared(tree).items():
-        value = declare(node, path.removeprefix(without), default, describe(about))
+        text, fixed = describe(about), not is_live(path, live)
+        value = declare(node, path.removeprefix(without), default, text, fixed=fixed)
         if value != default:
             values[path] = value
     try:
@@ -45,10 +49,10 @@ def declare_robot(node: Node) -> Robot:
     return robot(Path(file) if file else None, Path(main) if main else None)
 
 
-def declare_pfc(node: Node, output: str) -> PfcParameters:
+def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParameters:
     """Declare a predictive controller's design file and, on top of it, its tuning.
 
-    Raises ParameterError, naming node and parameter or file.
+    live: as for `declare_tree`. Raises ParameterError, naming node and parameter or file.
     """
     about = "YAML made by emir design; empty or `scheduled`: those that come with the project"
     file = declare(node, "model_file", "", about)
@@ -62,15 +66,15 @@ def declare_pfc(node: Node, output: str) -> PfcParameters:
     except ParameterError as error:
         name = f"{node.get_name()}: "
         raise ParameterError(name + str(error).removeprefix(name)) from None
-    return declare_tree(node, design)
+    return declare_tree(node, design, live=live)
 
 
-def declare(node: Node, name: str, default: Any, description: str) -> Any:
-    """Declare one parameter, fixed while the node runs, and return its value.
+def declare(node: Node, name: str, default: Any, description: str, *, fixed: bool = True) -> Any:
+    """Declare one parameter, as a rule fixed while the node runs, and return its value.
 
     Raises ParameterError for a value of another type; an integer will do for a float.
     """
-    descriptor = ParameterDescriptor(description=description, read_only=True, dynamic_typing=True)
+    descriptor = ParameterDescriptor(description=description, read_only=fixed, dynamic_typing=True)
     try:
         value = node.declare_parameter(name, default, descriptor).value
     except ParameterException as error:

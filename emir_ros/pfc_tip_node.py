@@ -4,12 +4,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from emir_analysis.node_controls import PfcTipControl
+from emir_control.pfc import PfcParameters
 from emir_control.pfc_file import TIP_ANGLE
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
+from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, reject_unknown
 from emir_ros.shell import ControlNode, Signals
+
+LIVE = ("response_time", "speed_limit", "acceleration_limit")
 
 
 class PfcTipNode(ControlNode):
@@ -17,7 +21,13 @@ class PfcTipNode(ControlNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("pfc_tip_node", PfcTipControl.inputs, PfcTipControl.outputs, arguments)
-        self.law = self.standing_by(PfcTipControl(Tip(law_of(declare_pfc(self, TIP_ANGLE)))))
+        parameters = declare_pfc(self, TIP_ANGLE, LIVE)
+
+        def tune(parameters: PfcParameters) -> None:
+            self.law = self.standing_by(PfcTipControl(Tip(law_of(parameters))))
+
+        tune(parameters)
+        LiveParameters(self, parameters, LIVE, tune)
         self.state: Any = None
         reject_unknown(self)
 

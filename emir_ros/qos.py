@@ -36,6 +36,13 @@ def offered(*, lockstep: bool) -> QoSProfile:
     )
 
 
+def latched() -> QoSProfile:
+    """Return what is offered for the one message that whoever comes late gets, too."""
+    profile = offered(lockstep=True)
+    profile.depth = 1
+    return profile
+
+
 def promised(topic: Topic, *, lockstep: bool) -> QoSProfile:
     """Return `offered`, in real time with a deadline of two periods and a sign of life."""
     profile = offered(lockstep=lockstep)

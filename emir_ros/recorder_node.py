@@ -14,8 +14,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from std_msgs.msg import Header
+from mcap.records import Attachment
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.parameter import parameter_value_to_python
+from std_msgs.msg import Header, String
 
+from emir_analysis.info import CHANGE, PARAMETERS, Change
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
@@ -40,10 +44,12 @@ from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
+from emir_ros.picture import DESCRIPTION
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import stamp_ns
 
-PARAMETERS = "emir.parameters"  # the metadata record: JSON by node
+PLANT = "plant_node"  # tells the robot description
+EVENTS = 1000  # depth, as ROS has it for parameter events
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
 
@@ -68,13 +74,19 @@ class RecorderNode(Shell):
         self._writer.add_metadata("emir", json.loads(about))
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._failed = False
+        self.changes = 0  # of parameters, recorded
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
             self._record(topic)
         self._described = not any(nodes)
+        self._answers: dict[str, dict[str, Any]] = {}
+        self._shape: str | None = None if PLANT in nodes else ""
         if not self._described:
-            self._record_of_parameters = ParameterRecord(self, nodes, self._describe)
+            self._record_of_parameters = ParameterRecord(self, nodes, self._on_answers)
+        self.create_subscription(String, DESCRIPTION, self._on_shape, qos.latched())
+        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
+        self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
 
@@ -167,11 +179,44 @@ class RecorderNode(Shell):
                 full_name = self._full_names[topic.name]
                 self._write(full_name, messages[topic.name], stamp, stamp)
 
-    def _describe(self, answers: dict[str, dict[str, Any]]) -> None:
-        """Store the parameters; in lock step nothing is written before, so as to be the same."""
-        self._writer.add_metadata(PARAMETERS, as_metadata(answers))
+    def _on_answers(self, answers: dict[str, dict[str, Any]]) -> None:
+        self._answers = answers
+        self._describe()
+
+    def _on_shape(self, message: String) -> None:
+        first, self._shape = not self._shape, message.data
+        if first and self._described:
+            self._attach_shape()
+        elif first:
+            self._describe()
+
+    def _describe(self) -> None:
+        """Store parameters and robot description once both have come.
+
+        In lock step nothing is written before, so that every recording is the same.
+        """
+        if not self._answers or self._shape is None:
+            return
+        self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+        if self._shape:
+            self._attach_shape()
         self._described = True
         self._write_complete_stamps()
+
+    def _attach_shape(self) -> None:
+        data = (self._shape or "").encode()
+        self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
+
+    def _on_change(self, event: ParameterEvent) -> None:
+        """Store what was set at a node while it runs, with the recording's own time."""
+        if self._nodes and event.node not in self._nodes:
+            return
+        time = self._next if self.lockstep else self.get_clock().now().nanoseconds
+        for parameter in event.changed_parameters:
+            value = parameter_value_to_python(parameter.value)
+            change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
+            self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
+            self.changes += 1
 
     def _report(self, stamp: int) -> None:
         message: Any = Header()

@@ -1,0 +1,48 @@
+"""Parameters that may be set while a node runs: checked as at its start, in force at a tick."""
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from emir_common.parameter_tree import declared, with_values
+from emir_common.quantity import ParameterError
+
+
+class LiveParameters:
+    """Quantities of a dataclass, already declared, of which some may change.
+
+    live: the last parts of their paths; the rest is declared read-only. apply(tree) is called with
+    the new values; a node's callbacks take turns, so that is between two of its periods.
+    """
+
+    def __init__(
+        self, node: Node, tree: Any, live: Collection[str], apply: Callable[[Any], None]
+    ) -> None:
+        self._tree, self._apply = tree, apply
+        self._paths = {path for path in declared(tree) if is_live(path, live)}
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._take)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            self._changed(parameters)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take(self, parameters: list[Parameter]) -> None:
+        if any(parameter.name in self._paths for parameter in parameters):
+            self._tree = self._changed(parameters)
+            self._apply(self._tree)
+
+    def _changed(self, parameters: list[Parameter]) -> Any:
+        values = {p.name: p.value for p in parameters if p.name in self._paths}
+        return with_values(self._tree, values)
+
+
+def is_live(path: str, live: Collection[str]) -> bool:
+    """Return whether the last part of a dotted path is one of those that may change."""
+    return path.rpartition(".")[2] in live

@@ -1,0 +1,120 @@
+"""Parameters set while a node runs: checked, in force from the next period, recorded."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from emir_analysis.info import info, text
+from emir_msgs_py.topics import CASCADE_TERMS, CONTROL_PERIOD_NS
+from emir_ros.cascade_node import CascadeNode
+from emir_ros.force_loop_node import ForceLoopNode
+from emir_ros.pfc_node import PfcNode
+from emir_ros.recorder_node import RecorderNode
+
+DT = CONTROL_PERIOD_NS * 1e-9
+SIGNALS = {"reference_stroke": 0.31, "reference_velocity": 0.0, "stroke": 0.3}
+
+
+@pytest.fixture(autouse=True)
+def ros(ros_domain: int) -> Iterator[None]:
+    rclpy.init()
+    yield
+    rclpy.shutdown()
+
+
+def _set(node: Node, name: str, value: float) -> str:
+    """Return why it was refused, "" if it was not."""
+    (result,) = node.set_parameters([Parameter(name, value=value)])
+    return "" if result.successful else result.reason
+
+
+def test_a_gain_is_in_force_from_the_next_period_and_the_state_is_kept() -> None:
+    node = CascadeNode(["--ros-args", "-p", "lockstep:=true"])
+    node.control(SIGNALS | {"reference_stroke": 0.3}, DT)
+    before = node.control(SIGNALS, DT)
+    assert before["feedback"] == pytest.approx(2.0 * (before["smoothed_reference"] - 0.3))
+    assert _set(node, "gain", 3) == ""
+    after = node.control(SIGNALS, DT)
+    assert after["feedback"] == pytest.approx(3.0 * (after["smoothed_reference"] - 0.3))
+    assert before["smoothed_reference"] < after["smoothed_reference"] < 0.302
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value", "reason"),
+    [
+        (CascadeNode, "gain", 99.0, r"gain = 99: outside 0 ... 50 1/s"),
+        (CascadeNode, "time_constant", float("nan"), r"time_constant = nan: outside"),
+        (ForceLoopNode, "gain", -1.0, r"gain = -1: outside 0 ... 1e-05 m/\(s N\)"),
+        (ForceLoopNode, "prefilter.dead_zone", 0.0, "read-only"),
+        (PfcNode, "response_time", 0.0, "response_time = 0: outside 0.05 ... 20 s"),
+        (PfcNode, "error_window", 3, "read-only"),
+    ],
+)
+def test_what_cannot_be_set_is_refused_with_the_reason(
+    make: Callable[[], Node], name: str, value: float, reason: str
+) -> None:
+    node = make()
+    before = node.get_parameter(name).value
+    with pytest.raises(AssertionError, match=reason):
+        assert _set(node, name, value) == ""
+    assert node.get_parameter(name).value == before
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"),
+    [(ForceLoopNode, "gain", 5e-8), (PfcNode, "response_time", 2.5)],
+)
+def test_the_law_has_what_was_set(make: Callable[[], Node], name: str, value: float) -> None:
+    node = make()
+    law = node.law
+    assert _set(node, name, value) == ""
+    held = node.law.force_loop if make is ForceLoopNode else node.law.pfc
+    assert getattr(held.parameters, name) == value
+    assert node.law is not law
+    node.destroy_node()
+
+
+def test_a_change_is_recorded(tmp_path: Path) -> None:
+    bag = tmp_path / "run"
+    words = [f"bag:={bag}", f"topics:=[{CASCADE_TERMS.name}]", "nodes:=[cascade_node]"]
+    recorder = RecorderNode(["--ros-args", *(w for p in words for w in ("-p", p))])
+    cascade = CascadeNode()
+    executor = SingleThreadedExecutor()
+    for node in (recorder, cascade):
+        executor.add_node(node)
+
+    def until(condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.01)
+
+    until(lambda: cascade.count_subscribers(CASCADE_TERMS.name) == 1)
+    until(lambda: cascade.count_subscribers("/parameter_events") >= 1)
+    sent = 0
+    while not recorder.changes:
+        cascade.publish(CASCADE_TERMS, 0, dict.fromkeys(CASCADE_TERMS.fields, 0.0))
+        sent += 1
+        assert _set(cascade, "gain", 2.0 + 0.01 * sent) == ""
+        assert sent < 100
+        for _ in range(20):
+            executor.spin_once(timeout_sec=0.01)
+    until(lambda: recorder.writer.message_count > 0)
+    recorder.close()
+    (first, *_) = info(bag).changes.values()
+    assert (first.node, first.name) == ("/cascade_node", "gain")
+    assert 2.0 < float(first.value) <= 2.0 + 0.01 * sent
+    assert f"s: /cascade_node gain = {first.value}" in text(info(bag))
+    for node in (recorder, cascade):
+        node.destroy_node()

@@ -53,7 +53,7 @@ Values = dict[str, Any]
 PLANT = "plant"
 NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "force_loop", PLANT)
 # parameters of nodes, not controllers
-OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby")
+OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby", "autostart")
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:

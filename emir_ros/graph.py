@@ -36,7 +36,7 @@ NODES = tuple(dict.fromkeys(  # each once
 ))  # fmt: skip
 EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
-OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby")
+OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby", "autostart")
 ROBOT_FILES = ("robot_file", "machine_file")
 ROBOT_CONTROLLERS = ("cascade",)
 

@@ -168,6 +168,9 @@ class PlantNode(Shell):
         return self._beat.values() | pressures(self.machine.signals(self.tick))
 
     def _on_timer(self) -> None:
+        if not self.active:  # time stands still
+            self._started = time.monotonic() - self.tick * PLANT_PERIOD_NS * 1e-9
+            return
         self._beat.tick(self.seconds())
         due = int((time.monotonic() - self._started) / (PLANT_PERIOD_NS * 1e-9))
         if due - self.tick > CONTROL_PERIOD_NS // PLANT_PERIOD_NS:

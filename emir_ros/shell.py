@@ -14,7 +14,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from emir_analysis.node_controls import NodeControl, Stepping
 from emir_analysis.switching import Ready
@@ -47,8 +47,11 @@ class NodeError(RuntimeError):
     """A node cannot go on; the message is one line."""
 
 
-class Shell(Node):
+class Shell(LifecycleNode):
     """A node with the graph's common parameters `lockstep` and `model`, and its publishers.
+
+    It is active from the start unless the parameter `autostart` says otherwise (in real time). An
+    inactive node takes no inputs and no steps and publishes nothing but its status.
 
     outputs: of joint 1's model. robot: those of the whole robot's, where the node knows that.
     arguments: ROS arguments of this node alone, beside those of the process. Raises
@@ -63,6 +66,7 @@ class Shell(Node):
         robot: Sequence[Topic] | None = None,
     ) -> None:
         self.failure: NodeError | ParameterError | SimulationError | None = None
+        self.active = False
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
         self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
@@ -73,6 +77,22 @@ class Shell(Node):
         self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
         self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
         self._offer(known[self.model])
+        if declare(self, "autostart", True, "active from the start; else by its services"):
+            self.trigger_configure()
+            self.trigger_activate()
+        elif self.lockstep:
+            raise ParameterError(f"{name}: autostart: lock step needs every node from the start")
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take inputs and steps from now on."""
+        self.active = True
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take none until `on_activate`."""
+        self.active = False
+        self.diagnostics.say(Level.WARN, "inactive")
+        return super().on_deactivate(state)
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
         for topic in outputs:
@@ -93,6 +113,10 @@ class Shell(Node):
     def hear(self, topic: Topic, receive: Callable[[bytes], None], profile: "QoSProfile") -> Any:
         """Subscribe to a topic's messages as bytes; counts who comes and goes, and deadlines."""
 
+        def take(data: bytes) -> None:
+            if self.active:
+                receive(data)
+
         def late(_: Any) -> None:
             self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
 
@@ -108,7 +132,7 @@ class Shell(Node):
         return self.create_subscription(
             conversions.message_class(topic.type),
             topic.name,
-            receive,
+            take,
             profile,
             event_callbacks=None if self.lockstep else events,
             qos_overriding_options=qos.overridable(lockstep=self.lockstep),
@@ -159,7 +183,12 @@ class Shell(Node):
         """
         simulated = self.get_parameter("use_sim_time").value
         clock = None if simulated else Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(period, callback, clock=clock)
+
+        def call() -> None:
+            if self.active:
+                callback()
+
+        self.create_timer(period, call, clock=clock)
 
     def seconds(self) -> float:
         """Return the time of the clock that timers run on, s."""
@@ -237,6 +266,13 @@ class ControlNode(Shell):
             self._shown: Signals = {}
             self.diagnostics.figures = self._figures
             self.start_timer(self._period * 1e-9, self._on_timer)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Publish last what is published without inputs: the force loop shuts the valve."""
+        instead = self.stale(["inactive"])
+        if instead is not None:
+            self._publish_all(self.get_clock().now().nanoseconds, instead)
+        return super().on_deactivate(state)
 
     def standing_by(self, control: NodeControl) -> Stepping:
         """Return the controller as this node shall hold it: alone, or one of several."""

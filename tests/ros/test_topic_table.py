@@ -59,6 +59,7 @@ def test_the_graph_publishes_what_the_table_says(model: str, tmp_path: Path) -> 
             node.destroy_node()
         rclpy.shutdown()
     beside = {f"/{RECORDED}", *FOR_THE_EYE, *EVERYBODYS}
+    beside |= {f"/{name}/transition_event" for name in names}
     assert {entry for entry in found if entry[1] not in beside} == wanted
 
 

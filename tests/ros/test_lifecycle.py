@@ -1,0 +1,79 @@
+"""Nodes as lifecycle nodes: inactive ones do nothing, and deactivating shuts the valve."""
+
+import time
+from collections.abc import Callable
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from emir_common.quantity import ParameterError
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import VALVE_COMMAND
+from emir_ros.cascade_node import CascadeNode
+from emir_ros.force_loop_node import ForceLoopNode
+from emir_ros.plant_node import PlantNode
+from emir_ros.trajectory_node import TrajectoryNode
+
+LATER = ["--ros-args", "-p", "autostart:=false"]
+AT_ONCE = ["--ros-args", "-p", "delay:=0.2", "-p", "distance:=0.2"]
+
+
+def test_activated_and_deactivated_by_its_services() -> None:
+    rclpy.init()
+    client, valve = Node("client"), []
+    kind = conversions.message_class(VALVE_COMMAND.type)
+    client.create_subscription(kind, VALVE_COMMAND.name, lambda m: valve.append(m.position[0]), 10)
+    loop = ForceLoopNode(LATER)
+    nodes = [client, PlantNode(), TrajectoryNode(AT_ONCE), CascadeNode(), loop]
+    executor = SingleThreadedExecutor()
+    for node in nodes:
+        executor.add_node(node)
+
+    def until(condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.02)
+
+    def call(kind: type, name: str, request: object) -> object:
+        service = client.create_client(kind, f"/force_loop_node/{name}")
+        until(service.service_is_ready)
+        future = service.call_async(request)
+        until(future.done)
+        return future.result()
+
+    def change(transition: int) -> bool:
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return call(ChangeState, "change_state", request).success
+
+    def state() -> int:
+        return call(GetState, "get_state", GetState.Request()).current_state.id
+
+    try:
+        assert state() == State.PRIMARY_STATE_UNCONFIGURED
+        assert change(Transition.TRANSITION_CONFIGURE)
+        assert state() == State.PRIMARY_STATE_INACTIVE
+        assert valve == []
+        assert change(Transition.TRANSITION_ACTIVATE)
+        until(lambda: valve and valve[-1] > 0.3)
+        assert state() == State.PRIMARY_STATE_ACTIVE
+        assert change(Transition.TRANSITION_DEACTIVATE)
+        until(lambda: valve[-1] == 0.0)
+        count = len(valve)
+        assert state() == State.PRIMARY_STATE_INACTIVE
+        assert len(valve) == count
+        assert change(Transition.TRANSITION_ACTIVATE)
+        until(lambda: valve[-1] > 0.3)
+        with pytest.raises(ParameterError, match="autostart: lock step needs every node"):
+            CascadeNode([*LATER, "-p", "lockstep:=true"])
+    finally:
+        for node in nodes:
+            node.destroy_node()
+        rclpy.shutdown()

@@ -1,7 +1,6 @@
 """cascade_node: conventional position control of the piston, law (11), or of all six."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from emir_analysis.node_controls import CascadeControl, Stepping
 from emir_analysis.robot_controls import RobotCascadeControl
@@ -11,7 +10,7 @@ from emir_msgs_py.topics import ROBOT
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
-from emir_ros.shell import ControlNode, Signals
+from emir_ros.shell import ControlNode
 
 LIVE = ("gain", "time_constant")
 
@@ -32,17 +31,7 @@ class CascadeNode(ControlNode):
 
         tune(parameters)
         LiveParameters(self, parameters, LIVE, tune)
-        self.state: Any = None
         reject_unknown(self)
-
-    def control(self, signals: Signals, dt: float) -> Signals:
-        """Return command and terms of this control period."""
-        self.state, outputs = self.law.step(self.state, signals, dt)
-        return outputs
-
-    def stale(self, missing: Sequence[str]) -> None:
-        """Publish nothing, so that the valve shuts; the smoothing starts anew afterwards."""
-        self.state = None
 
 
 def main() -> None:

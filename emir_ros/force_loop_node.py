@@ -42,15 +42,9 @@ class ForceLoopNode(ControlNode):
 
         tune(parameters)
         LiveParameters(self, parameters, LIVE, tune)
-        self.state: Any = None
         reject_unknown(self)
         if not self.lockstep:
             self.start_timer(PLANT_PERIOD_NS * 1e-9, self._watch)
-
-    def control(self, signals: Signals, dt: float) -> Signals:
-        """Return command and terms of this control period."""
-        self.state, outputs = self.law.step(self.state, signals, dt)
-        return outputs
 
     def _watch(self) -> None:
         missing = self.missing()

@@ -1,7 +1,6 @@
 """pfc_tip_node: predictive functional control of the TCP's angle alpha_6 (paper 3.3)."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from emir_analysis.node_controls import PfcTipControl
 from emir_control.pfc import PfcParameters
@@ -11,7 +10,7 @@ from emir_control.tip import Tip
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, reject_unknown
-from emir_ros.shell import ControlNode, Signals
+from emir_ros.shell import ControlNode
 
 LIVE = ("response_time", "speed_limit", "acceleration_limit")
 
@@ -28,17 +27,7 @@ class PfcTipNode(ControlNode):
 
         tune(parameters)
         LiveParameters(self, parameters, LIVE, tune)
-        self.state: Any = None
         reject_unknown(self)
-
-    def control(self, signals: Signals, dt: float) -> Signals:
-        """Return command and terms of this control period."""
-        self.state, outputs = self.law.step(self.state, signals, dt)
-        return outputs
-
-    def stale(self, missing: Sequence[str]) -> None:
-        """Publish nothing, so that the valve shuts; the model starts anew afterwards."""
-        self.state = None
 
 
 def main() -> None:

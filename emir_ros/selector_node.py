@@ -32,7 +32,7 @@ class SelectorNode(ControlNode):
         if len(times) != len(switched):
             raise ParameterError("selector_node: switch_times and switch_to differ in length")
         try:
-            self.law = Selector(
+            self.selector = Selector(
                 names, [Switch(*pair) for pair in zip(times, switched, strict=True)]
             )
         except ParameterError as error:
@@ -49,11 +49,11 @@ class SelectorNode(ControlNode):
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the command of the controller that is chosen."""
-        due = self.law.due(self._ticks, dt)
-        if self._ticks and due != self.law.due(self._ticks - 1, dt):
+        due = self.selector.due(self._ticks, dt)
+        if self._ticks and due != self.selector.due(self._ticks - 1, dt):
             self._chosen = due
         self._ticks += 1
-        return self.law.selected(self._chosen, signals)
+        return self.selector.selected(self._chosen, signals)
 
     def needed(self) -> Collection[str]:
         """Return the one command that matters; the others may be missing."""
@@ -64,8 +64,8 @@ class SelectorNode(ControlNode):
         return f"{self._chosen} drives the machine"
 
     def _check(self, name: str) -> None:
-        if name not in self.law.controllers:
-            known = ", ".join(self.law.controllers)
+        if name not in self.selector.controllers:
+            known = ", ".join(self.selector.controllers)
             raise ParameterError(f"selector_node: controller {name!r}: running are {known}")
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:

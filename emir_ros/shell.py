@@ -219,16 +219,18 @@ def is_saturated(signals: Mapping[str, float]) -> bool:
 class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
-    A subclass implements `control`; `stale` says what to do without fresh inputs. A command
-    that two nodes publish counts as missing: nobody knows which of them to obey. The node acts as
-    often as its first output is to come. robot: whose inputs and outputs it has when the model is
-    the whole robot.
+    A subclass sets `law`, whose state the node keeps; `stale` says what to do without fresh
+    inputs. A command that two nodes publish counts as missing: nobody knows which of them to obey.
+    The node acts as often as its first output is to come. robot: whose inputs and outputs it has
+    when the model is the whole robot.
 
     A node that commands the piston's velocity has the parameter `standby`: it then offers its
     command to selector_node, which tells it what was applied, and holds its state ready.
     """
 
     consequence = "no output"  # of missing inputs, in words
+    law: Stepping
+    state: Any = None  # of the law; None: it has not begun
     timeout = 0.1  # s, by default, after which an input is stale
 
     def __init__(
@@ -288,10 +290,16 @@ class ControlNode(Shell):
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the output signals of one control period of dt, s."""
-        raise NotImplementedError
+        answer: Signals
+        self.state, answer = self.law.step(self.state, signals, dt)
+        return answer
 
     def stale(self, missing: Sequence[str]) -> Signals | None:
-        """Return what to publish while inputs are missing or too old; None: nothing."""
+        """Return what to publish while inputs are missing or too old; None: nothing.
+
+        Where a controller publishes nothing the valve shuts. Afterwards it starts anew.
+        """
+        self.state = None
         return None
 
     def needed(self) -> Collection[str]:

@@ -21,7 +21,7 @@ from emir_msgs_py.topics import ROBOT
 from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
-from emir_ros.shell import ControlNode, Signals
+from emir_ros.shell import ControlNode
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
 JOINT_TRAJECTORY = "joint_trajectory"
@@ -47,7 +47,6 @@ class TrajectoryNode(ControlNode):
             self.law = six(trajectory(sheet, name, move, path))
         else:
             self.law = mine(named(name, move))
-        self.state: Any = None
         reject_unknown(self)
         self._name = self._doing = name
         self._stopped = False
@@ -56,10 +55,8 @@ class TrajectoryNode(ControlNode):
             self.create_service(Trigger, f"~/{verb.__name__}", self._answer(verb))
         self.create_subscription(JointTrajectory, JOINT_TRAJECTORY, self._on_waypoints, RELIABLE)
 
-    def control(self, signals: Signals, dt: float) -> Signals:
-        """Return the reference of this control period and of the next ones."""
-        self.state, outputs = self.law.step(self.state, signals, dt)
-        return outputs
+    def stale(self, missing: Sequence[str]) -> None:
+        """Publish nothing; the motion goes on when the inputs are back."""
 
     def status(self) -> str:
         """Return what is being done."""

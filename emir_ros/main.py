@@ -2,7 +2,8 @@
 
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
@@ -41,9 +42,17 @@ def start_ros() -> StopRequest:
     return StopRequest()
 
 
-def make_executor(*, lockstep: bool) -> Any:
-    """Return the executor to spin with `spin_once`: lock step takes the faster, newer one."""
-    return EventsExecutor() if lockstep else SingleThreadedExecutor()
+@contextmanager
+def make_executor(*, lockstep: bool) -> Iterator[Any]:
+    """Give the executor to spin with `spin_once`: lock step takes the faster, newer one.
+
+    It is shut down before the nodes and the context are: left over, it may complain at exit.
+    """
+    executor: Any = EventsExecutor() if lockstep else SingleThreadedExecutor()
+    try:
+        yield executor
+    finally:
+        executor.shutdown()
 
 
 def run(node_class: Callable[[], Shell]) -> None:
@@ -59,11 +68,11 @@ def _run(node_class: Callable[[], Shell]) -> int:
     try:
         stop = start_ros()
         node = node_class()
-        executor = make_executor(lockstep=node.lockstep)
-        executor.add_node(node)
-        while not (stop.made or node.done):
-            executor.spin_once(timeout_sec=0.1)
-            node.check()
+        with make_executor(lockstep=node.lockstep) as executor:
+            executor.add_node(node)
+            while not (stop.made or node.done):
+                executor.spin_once(timeout_sec=0.1)
+                node.check()
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
     except (ParameterError, NodeError, SimulationError) as error:

@@ -106,18 +106,18 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
     stop = start_ros()
     nodes: dict[str, Shell] = {}
     try:
-        executor = make_executor(lockstep=plan.lockstep)
-        for name in plan.nodes:
-            nodes[name] = _node_class(name)(ros)
-            executor.add_node(nodes[name])
-        plant = nodes["plant_node"]
-        while not plant.done:
-            if stop.made:
-                raise KeyboardInterrupt
-            executor.spin_once(timeout_sec=0.1)
-            for node in nodes.values():
-                node.check()
-        _receive_the_rest(executor)
+        with make_executor(lockstep=plan.lockstep) as executor:
+            for name in plan.nodes:
+                nodes[name] = _node_class(name)(ros)
+                executor.add_node(nodes[name])
+            plant = nodes["plant_node"]
+            while not plant.done:
+                if stop.made:
+                    raise KeyboardInterrupt
+                executor.spin_once(timeout_sec=0.1)
+                for node in nodes.values():
+                    node.check()
+            _receive_the_rest(executor)
     finally:
         for node in nodes.values():
             node.close()

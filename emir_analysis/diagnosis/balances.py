@@ -25,6 +25,7 @@ from emir_analysis.diagnosis.experiment import (
     COMMAND_STEP,
     OUTPUTS,
     STROKE,
+    SUBSTEP,
     Experiment,
 )
 from emir_analysis.diagnosis.free_run import ANGLE as ANGLE_COLUMN
@@ -63,7 +64,6 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
-SUBSTEP = 2e-3  # s, of the states that no sensor shows: a tenth of the spool's period and less
 
 
 class Balances:
@@ -189,11 +189,7 @@ class Balances:
         if not starts:
             return []
         able = list(starts)
-        stride = max(
-            n
-            for n in range(1, experiment.every + 1)
-            if experiment.every % n == 0 and n * COMMAND_STEP <= SUBSTEP
-        )
+        stride = experiment.stride(SUBSTEP)
         followed = follow(
             np.array(list(starts.values())),
             experiment.commands[::stride],

@@ -65,7 +65,7 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         # a neighbour that cannot be simulated says nothing about the slope
         return np.vstack([np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0), prior])
 
-    margin = 1e-6 * (high - low)
+    margin = 1e-6 * np.minimum(high - low, 1.0)
     result = least_squares(
         residuals,
         np.clip(problem.start, low + margin, high - margin),

@@ -230,7 +230,7 @@ def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evide
     time = evidence.time[: force.size]
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
-    loads = [(*swing, 1e6) for swing in _swings(time, force)]
+    loads = [(*swing, 1e6) for swing in swings(time, force)]
     total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
     first, last = np.triu_indices(total.size, 4)
     unlike = (total[last] - total[first]) ** 2 / (last - first)
@@ -250,7 +250,7 @@ def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evide
     ]
 
 
-def _swings(time: Array, force: Array) -> list[tuple[float, float, float, float]]:
+def swings(time: Array, force: Array) -> list[tuple[float, float, float, float]]:
     """Return force, N, frequency, Hz, phase, rad, and begin, s, of a harmonic beside a constant.
 
     By least squares over a grid of frequencies and begins: the best from the start on, the best

@@ -151,7 +151,7 @@ class _Search:
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= AT_NOISE**2 - 1.0:
                 break
-        if not enough and len(plain.effects) + 1 < MOST_EFFECTS:
+        if not enough and np.any(self._evidence.fitted):
             self._progress("pairs of effects")
             found = screen_pairs(plain, self._sheet, self._head, self.floor)
             better = self._better(self._on_balances(found, best), best)
@@ -160,19 +160,30 @@ class _Search:
         return equal
 
     def _beside(self, best: Tried) -> list[Tried]:
-        """Return what is better with one effect more."""
-        found = screen(best.trial, self._sheet, self._head, self.floor)
-        return self._better(self._on_balances(found, best), best)
+        """Return what is better with one effect more.
+
+        Where missing sensors leave balances out, what those would show is in the free run alone.
+        """
+        if np.any(self._evidence.fitted):
+            found = screen(best.trial, self._sheet, self._head, self.floor)
+            better = self._better(self._on_balances(found, best), best)
+            if better or np.all(self._evidence.told):
+                return better
+        return self._better(self._on_free_run(best), best)
 
     def _beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.
 
         The balances are quiet then; the free run alone may know more.
         """
-        found = screen_free_run(best.trial, self._sheet, self._head)
         least = 0.5 * self._excess(best.trial)
-        better = self._better([self._scored(s.trial) for s in found[:MOST_SIMULATED]], best)
+        better = self._better(self._on_free_run(best), best)
         return [t for t in better if self._excess(t.trial) < least]
+
+    def _on_free_run(self, best: Tried) -> list[Tried]:
+        """Return the trials with one effect more that promise most on the free run."""
+        found = screen_free_run(best.trial, self._sheet, self._head)
+        return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
 
     def _on_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
         """Fit trials to the balances; return those that come close to the best of them."""

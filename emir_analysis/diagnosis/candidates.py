@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
+from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
@@ -183,7 +184,7 @@ class Starts:
     """States of rest at the start of a recording that the sensors leave open.
 
     Two numbers from -1 to 1: the angle within the resolver's step and p_S within its noise, or
-    within what the pump gives where no sensor shows it.
+    within what lets the boom rest where no sensor shows it.
     """
 
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
@@ -192,14 +193,31 @@ class Starts:
         half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
         half_range = sensors.pressure_noise
         if np.isnan(pressure):
-            supply = evidence.stated.supply
-            pressure, half_range = 0.5 * (supply.pT + supply.p0), 0.5 * (supply.p0 - supply.pT)
+            low, high = _resting_pressures(evidence.stated, angle)
+            pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)
         self._middle = np.array([angle, pressure])
         self._half = np.array([half_step, half_range])
 
     def at(self, points: Array) -> list[tuple[float, float]]:
         """Return angle, rad, and p_S, Pa, for (m, 2) numbers."""
         return [(float(a), float(p)) for a, p in self._middle + self._half * points]
+
+
+def _resting_pressures(machine: Machine, angle: float) -> tuple[float, float]:
+    """Return between which p_S, Pa, a machine can rest at an angle, rad: half the pump's or less.
+
+    More is not left in a lowering chamber that was shut at standstill.
+    """
+    low, high = machine.supply.pT, 0.5 * machine.supply.p0
+    plant = Plant(machine)
+    for _ in range(5):
+        try:
+            plant.initial(angle, high)
+        except SimulationError:
+            high = 0.5 * (low + high)
+        else:
+            return low, high
+    return low, low
 
 
 def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:

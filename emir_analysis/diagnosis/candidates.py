@@ -6,7 +6,7 @@ and from there on the free run.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
@@ -103,11 +103,16 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     forgotten: it belongs to the recording, not to the machine.
     """
     x = np.append(_shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
+    begins = [x]
     for share in GROWING:
-        begun = _fit_free_run(start, evidence, share, x, ROUGH)
-        x = begun.x
+        begun = fit(_free_run_problem(start, evidence, share, begins[-1]), ROUGH)
+        begins.append(begun.x)
     accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
-    return start.continued(_fit_free_run(start, evidence, 1.0, x, accuracy))
+    # what acts late is not told by the beginning, and may have been led astray there
+    whole = _free_run_problem(start, evidence, 1.0, x)
+    cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)
+    best = begins[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))]
+    return start.continued(fit(replace(whole, start=best), accuracy))
 
 
 def _shaped(start: Trial, evidence: Evidence) -> Trial:
@@ -149,12 +154,14 @@ def _shapes(start: Trial, effect: str) -> Array:
 def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole."""
     x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
-    return known.continued(_fit_free_run(known, evidence, 1.0, x, ACCURACY))
+    return known.continued(fit(_free_run_problem(known, evidence, 1.0, x), ACCURACY))
 
 
-def _fit_free_run(
-    start: Trial, evidence: Evidence, share: float, x: Array, accuracy: float
-) -> Solution:
+def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) -> Problem:
+    """Return the free run of the first part of recordings as a problem.
+
+    x: start, (k + 2 r,), the trial's and two numbers for the state at rest in each recording.
+    """
     own, states = start.x.size, x.size - start.x.size
     experiments = [e.head(share) for e in evidence.experiments]
     starts = [Starts(e, evidence) for e in experiments]
@@ -168,7 +175,7 @@ def _fit_free_run(
         return np.concatenate(parts, axis=1)
 
     low, high = start.unknowns.bounds
-    problem = Problem(
+    return Problem(
         model,
         x,
         np.append(low, -np.ones(states)),
@@ -177,7 +184,6 @@ def _fit_free_run(
         partial(model, coarse=True),
         SLOPE_STEP,
     )
-    return fit(problem, accuracy)
 
 
 class Starts:

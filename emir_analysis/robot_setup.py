@@ -4,7 +4,7 @@ Needs no Pinocchio.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,6 @@ Array = NDArray[np.float64]
 # between 0.27 and 0.7 Hz keeps a damping of 0.2 of critical (docs/robot.md).
 GAIN = 0.7  # 1/s, k_p of law (11)
 LAG = 0.05  # s, T of law (11): command held for a period, force loop's period, spool, resolver
-ENOUGH = 5e7  # Pa, at the pump: where its pressure is short a wider opening helps little
 ENDLESS = (-5.0, 5.0)  # rad, the base
 HIGH_PASS = 3.0  # s, T_H of (10)
 DAMPING_RATE = 3.0  # 1/s, at which the force loop lets a cylinder's oil relax
@@ -79,6 +78,9 @@ class RobotPathParameters:
     line: LineParameters = field(default_factory=LineParameters)
     weigh: int = quantity(
         "1", 0, 1, "1: the payload is read off the pistons' forces; 0: arm.payload", default=1
+    )
+    joint: int = quantity(
+        "1", 0, 5, "that lift-lower and lower-lift move, 0 the base: its m are rad", default=1
     )
     supply: float = quantity("Pa", 1e6, 5e7, "what the pump gives", default=2e7)
 
@@ -141,7 +143,7 @@ def _force_loop(machine: Machine, low: float, high: float) -> DriveLoopParameter
     return DriveLoopParameters(
         gain=DAMPING_RATE / spring,
         time_constant=HIGH_PASS,
-        actuator=replace(actuator(machine), supply=ENOUGH),
+        actuator=actuator(machine),
         limits=LimitParameters(
             speed=1.1 * v.flow_nominal / c.area_lifting, stroke_low=low, stroke_high=high
         ),
@@ -187,4 +189,5 @@ def trajectory(
         move=move,
         line=path.line,
         weigh=bool(path.weigh),
+        joint=path.joint,
     )

@@ -98,7 +98,7 @@ class DriveLoop:
         wanted = allowed + rate / self.drive.stiffness(stroke) - feedback
         velocity = off_the_ends(wanted, stroke, 0.0, p.limits)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, dt)
-        oil = Oil(stroke, *inputs[3:], max(logic, LEAST_OPEN))
+        oil = self._oil(inputs, velocity, max(logic, LEAST_OPEN))
         still = abs(velocity) < p.actuator.static.standstill
         opening = 0.0 if still else self.drive.opening(velocity, oil)
         within = velocity == wanted and allowed == inputs.velocity_command
@@ -106,3 +106,15 @@ class DriveLoop:
             self.drive.command(opening), force, feedback, velocity, abs(opening) >= 1.0, not within
         )
         return DriveLoopState(static, expected, allowed, logic), outputs
+
+    def _oil(self, inputs: DriveLoopInputs, velocity: float, logic: float) -> Oil:
+        """Return the oil as the inverse reckons with it.
+
+        The pump is taken to have the metering edge's drop to spare, so that one that gives more
+        than stated does not open the valve wide.
+        """
+        p, lifting, lowering = self.parameters.actuator, *inputs[3:]
+        most = p.supply - p.balance
+        if velocity > 0.0:
+            return Oil(inputs.stroke, min(lifting, most), lowering, logic)
+        return Oil(inputs.stroke, lifting, min(lowering, most), logic)

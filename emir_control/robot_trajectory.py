@@ -1,4 +1,4 @@
-"""Desired motion of all six joints: joint 1 away and back, or the TCP along a straight line.
+"""Desired motion of all six joints: one of them away and back, or the TCP along a straight line.
 
 Either is a path, the same for way and way back, and a trapezoidal velocity along it. A path starts
 where the joints are measured to be.
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 LINE = "line"
 SPACING = 0.05  # m of a line between two of its places that are computed
-POINTS = 41  # of a path of joint 1
+POINTS = 41  # of a path of one joint
 STEP = 1e-6  # rad, for the slope of a linkage
 HEAVIEST = 3000.0  # kg, that a payload is taken for
 BAR = 1e5  # Pa
@@ -125,8 +125,9 @@ class RobotTrajectoryState(NamedTuple):
 class RobotTrajectory:
     """A path of all joints, away and back.
 
-    name: a move of joint 1's piston (lift-lower, lower-lift, hold) or line. ranges: of the
-    joints. supply: what the pump gives at most. weigh: read the payload off the pistons' forces.
+    name: a move of one joint's piston (lift-lower, lower-lift, hold) or line. joint: which one,
+    0 being the base. ranges: of the joints. supply: what the pump gives at most. weigh: read the
+    payload off the pistons' forces.
     """
 
     name: str
@@ -138,6 +139,7 @@ class RobotTrajectory:
     move: TrajectoryParameters
     line: LineParameters
     weigh: bool = False
+    joint: int = 1
 
     def __post_init__(self) -> None:
         if self.name != LINE:
@@ -213,15 +215,14 @@ class RobotTrajectory:
 
     def _piston(self, start: Array) -> tuple[Path, Timing]:
         distance = distance_of(self.name, self.move)
-        first = self.linkages[1].stroke(start[1])
+        linkage, name, k = self.linkages[self.joint], JOINTS[self.joint], self.joint
+        first = linkage.stroke(start[k])
         ways = np.linspace(0.0, abs(distance) or 1.0, POINTS)
         joints = np.tile(start, (POINTS, 1))
         if distance:
-            sign = np.sign(distance)
-            joints[:, 1] = [self.linkages[1].angle(first + sign * way) for way in ways]
-        low, high = self.ranges.low[1], self.ranges.high[1]
-        if not ((low <= joints[:, 1]) & (joints[:, 1] <= high)).all():
-            raise ReachError(f"{self.name}: joint1 would go beyond the end of its stroke")
+            joints[:, k] = [linkage.angle(first + np.sign(distance) * way) for way in ways]
+        if not ((self.ranges.low[k] <= joints[:, k]) & (joints[:, k] <= self.ranges.high[k])).all():
+            raise ReachError(f"{self.name}: {name} would go beyond the end of its stroke")
         places = np.array([self.arm.tcp(angles) for angles in joints])
         path = self._path(ways, joints, places, self.move.speed)
         return path, Timing(

@@ -115,7 +115,7 @@ class PlantNode(Shell):
         self._publish_tick()
 
     def _publish_tick(self) -> None:
-        stamp = self.tick * PLANT_PERIOD_NS
+        self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
         self._clock_publisher.publish(clock_message(stamp))
         self._publish_sensors(stamp)
 

@@ -115,7 +115,7 @@ class PlantNode(Shell):
         self._publish_tick()
 
     def _publish_tick(self) -> None:
-        stamp = self.tick * PLANT_PERIOD_NS
+        self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
         clock = ClockMessage()
         clock.clock.sec, clock.clock.nanosec = divmod(stamp, conversions.NANOSECONDS)
         self._clock_publisher.publish(clock)

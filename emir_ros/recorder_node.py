@@ -19,6 +19,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Header, String
 
+from emir_analysis import parameter_files
 from emir_analysis.info import CHANGE, PARAMETERS, Change
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
@@ -40,11 +41,13 @@ from emir_msgs_py.topics import (
     by_name,
 )
 from emir_ros import qos
+from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
+from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import stamp_ns
 
@@ -75,6 +78,8 @@ class RecorderNode(Shell):
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._failed = False
         self.changes = 0  # of parameters, recorded
+        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
+        self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
@@ -85,7 +90,6 @@ class RecorderNode(Shell):
         if not self._described:
             self._record_of_parameters = ParameterRecord(self, nodes, self._on_answers)
         self.create_subscription(String, DESCRIPTION, self._on_shape, qos.latched())
-        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
         self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
@@ -119,6 +123,7 @@ class RecorderNode(Shell):
             return
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
+        self._events.write_all()
         with self._watched():
             self._writer.close()
 
@@ -163,6 +168,7 @@ class RecorderNode(Shell):
         while self._described and self._is_complete(self._next):
             self._write_stamp(self._next)
             if self._next % FLUSH_PERIOD_NS == 0:
+                self._events.write_until(self._next - FLUSH_PERIOD_NS)
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._report(self._next)
@@ -198,10 +204,19 @@ class RecorderNode(Shell):
         if not self._answers or self._shape is None:
             return
         self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+        for name, values in self._answers.items():
+            self._attach_files(name, values)
         if self._shape:
             self._attach_shape()
         self._described = True
         self._write_complete_stamps()
+
+    def _attach_files(self, node: str, values: dict[str, Any]) -> None:
+        try:
+            for attachment in parameter_files.attachments(node, values):
+                self._writer.add_attachment(attachment)
+        except ParameterError as error:
+            self.diagnostics.say(Level.WARN, f"not in the recording: {error}")
 
     def _attach_shape(self) -> None:
         data = (self._shape or "").encode()

@@ -59,11 +59,14 @@ class Truth(NamedTuple):
 
 
 @compiled
-def _dot(a: Array, b: Array) -> float:
-    """Return the inner product; on a handful of numbers a loop is faster than BLAS."""
+def _sum(shape: Array, x: Array, first: int) -> float:
+    """Return the sum of modal values, x from index `first` on, each times its mode's share.
+
+    By index, not by slice: numba counts references to a slice, atomically, at every call.
+    """
     total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
+    for i in range(shape.size):
+        total += shape[i] * x[first + i]
     return total
 
 
@@ -83,15 +86,14 @@ class _Motion(NamedTuple):
 @compiled
 def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
-    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
-    angle = _dot(p.mode_joint, position)
+    angle = _sum(p.mode_joint, x, MODES)
     arm = linkage_error.lever_arm(angle, p)
-    joint_velocity = arm * _dot(p.mode_joint, rate)
+    joint_velocity = arm * _sum(p.mode_joint, x, MODES + n)
     force = chambers.piston_force(x[P_H], x[P_S], p)
     offset_rate = backlash.rate(x[OFFSET], force, p)
     return _Motion(
         angle,
-        _dot(p.mode_tip_angle, position),
+        _sum(p.mode_tip_angle, x, MODES),
         arm,
         linkage_error.stroke(angle, p) + x[OFFSET],
         joint_velocity + offset_rate,
@@ -175,18 +177,17 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
 @compiled
 def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> None:
     n = p.mode_joint.size
-    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
     torque = (motion.force - friction) * motion.arm
     gravity = math.cos(motion.angle)
     load = external_load.force(x[TIME], p)
     for i in range(n):
-        dx[MODES + i] = rate[i]
+        dx[MODES + i] = x[MODES + n + i]
         dx[MODES + n + i] = (
             p.mode_joint[i] * torque
             - p.mode_weight[i] * gravity
-            - p.mode_stiffness[i] * position[i]
-            - p.mode_damping[i] * rate[i]
+            - p.mode_stiffness[i] * x[MODES + i]
+            - p.mode_damping[i] * x[MODES + n + i]
             + p.mode_tip[i] * load
         )
 
@@ -197,7 +198,7 @@ def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     p = parameters[0]
     motion = _motion(x, p)
     flow_lifting, flow_lowering, _ = _valve_flows(x, p)
-    bending = _dot(p.mode_deflection, x[MODES : MODES + p.mode_joint.size])
+    bending = _sum(p.mode_deflection, x, MODES)
     load = external_load.force(x[TIME], p)
     return Truth(
         motion.angle,
@@ -258,8 +259,8 @@ def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) ->
     n = p.mode_joint.size
     motion = _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
-    gained = motion.arm * _dot(p.mode_joint, dx[MODES + n : MODES + 2 * n])
-    mobility = h * motion.arm * motion.arm * _dot(p.mode_joint, p.mode_joint)
+    gained = motion.arm * _sum(p.mode_joint, dx, MODES + n)
+    mobility = h * motion.arm * motion.arm * _sum(p.mode_joint, p.mode_joint, 0)
     unhindered = motion.joint_velocity + h * gained
     dry = dry_friction.over_step(unhindered, mobility, motion.force, p)
     for i in range(n):

@@ -29,7 +29,7 @@ numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 def compiled(function: Function) -> Function:
     """Compile `function` with numba: IEEE arithmetic, cached on disk."""
-    return cast("Function", numba.njit(cache=True, error_model="numpy")(function))
+    return cast("Function", numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
 
 
 def compiled_parallel(function: Function) -> Function:

@@ -58,18 +58,6 @@ class Truth(NamedTuple):
     tcp_deflection: float  # off the line of the first section, up positive, m
 
 
-@compiled
-def _sum(shape: Array, x: Array, first: int) -> float:
-    """Return the sum of modal values, x from index `first` on, each times its mode's share.
-
-    By index, not by slice: numba counts references to a slice, atomically, at every call.
-    """
-    total = 0.0
-    for i in range(shape.size):
-        total += shape[i] * x[first + i]
-    return total
-
-
 class _Motion(NamedTuple):
     """The boom and the piston at an instant; SI units."""
 
@@ -86,14 +74,18 @@ class _Motion(NamedTuple):
 @compiled
 def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
-    angle = _sum(p.mode_joint, x, MODES)
+    angle, tip_angle, turning = 0.0, 0.0, 0.0
+    for i in range(n):
+        angle += p.mode_joint[i] * x[MODES + i]
+        tip_angle += p.mode_tip_angle[i] * x[MODES + i]
+        turning += p.mode_joint[i] * x[MODES + n + i]
     arm = linkage_error.lever_arm(angle, p)
-    joint_velocity = arm * _sum(p.mode_joint, x, MODES + n)
+    joint_velocity = arm * turning
     force = chambers.piston_force(x[P_H], x[P_S], p)
     offset_rate = backlash.rate(x[OFFSET], force, p)
     return _Motion(
         angle,
-        _sum(p.mode_tip_angle, x, MODES),
+        tip_angle,
         arm,
         linkage_error.stroke(angle, p) + x[OFFSET],
         joint_velocity + offset_rate,
@@ -198,7 +190,9 @@ def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     p = parameters[0]
     motion = _motion(x, p)
     flow_lifting, flow_lowering, _ = _valve_flows(x, p)
-    bending = _sum(p.mode_deflection, x, MODES)
+    bending = 0.0
+    for i in range(p.mode_deflection.size):
+        bending += p.mode_deflection[i] * x[MODES + i]
     load = external_load.force(x[TIME], p)
     return Truth(
         motion.angle,
@@ -238,19 +232,27 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
         dry = _write_first_rates(x, arriving, h, p, k1)
-        for i in range(x.size):
-            between[i] = x[i] + 0.5 * h * k1[i]
+        _write_sum(x, 0.5 * h, k1, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k2)
-        for i in range(x.size):
-            between[i] = x[i] + 0.5 * h * k2[i]
+        _write_sum(x, 0.5 * h, k2, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k3)
-        for i in range(x.size):
-            between[i] = x[i] + h * k3[i]
+        _write_sum(x, h, k3, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k4)
-        for i in range(x.size):
+        for i in range(DELAY_LINE):
+            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+        for i in range(MODES, MODES + 2 * p.mode_joint.size):
             x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         x[P_H] = max(x[P_H], 0.0)
         x[P_S] = max(x[P_S], 0.0)
+
+
+@compiled
+def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
+    """Write x + h rates to result, but for the delay line: `command_delay` alone works on it."""
+    for i in range(DELAY_LINE):
+        result[i] = x[i] + h * rates[i]
+    for i in range(MODES, MODES + 2 * p.mode_joint.size):
+        result[i] = x[i] + h * rates[i]
 
 
 @compiled
@@ -259,9 +261,12 @@ def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) ->
     n = p.mode_joint.size
     motion = _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
-    gained = motion.arm * _sum(p.mode_joint, dx, MODES + n)
-    mobility = h * motion.arm * motion.arm * _sum(p.mode_joint, p.mode_joint, 0)
-    unhindered = motion.joint_velocity + h * gained
+    turning, admittance = 0.0, 0.0
+    for i in range(n):
+        turning += p.mode_joint[i] * dx[MODES + n + i]
+        admittance += p.mode_joint[i] * p.mode_joint[i]
+    mobility = h * motion.arm * motion.arm * admittance
+    unhindered = motion.joint_velocity + h * (motion.arm * turning)
     dry = dry_friction.over_step(unhindered, mobility, motion.force, p)
     for i in range(n):
         dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry

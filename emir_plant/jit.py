@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from llvmlite import ir
+from numba.extending import intrinsic
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -36,3 +38,18 @@ def compiled_parallel(function: Function) -> Function:
     """As `compiled`, with the loops written as `numba.prange` run on all cores."""
     decorate = numba.njit(cache=True, error_model="numpy", parallel=True)
     return cast("Function", decorate(function))
+
+
+@intrinsic
+def _sqrt(typing, x):
+    def generate(context, builder, signature, arguments):
+        double = ir.DoubleType()
+        function = builder.module.declare_intrinsic("llvm.sqrt", [double])
+        return builder.call(function, arguments)
+    return numba.float64(numba.float64), generate
+
+
+@compiled
+def square_root(x: float) -> float:
+    """Return the square root, nan of a negative number; math.sqrt calls the C library for that."""
+    return _sqrt(x)

@@ -7,13 +7,13 @@ up; the joint torque is F r with r = dh/dalpha > 0. Paper equation (1), with its
 import math
 from typing import Any
 
-from emir_plant.jit import compiled
+from emir_plant.jit import compiled, square_root
 
 
 @compiled
 def third_side(a: float, b: float, enclosed: float) -> float:
     """Return a triangle's third side, m, from two, m, and the angle that they enclose, rad."""
-    return math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(enclosed))
+    return square_root(a * a + b * b - 2.0 * a * b * math.cos(enclosed))
 
 
 @compiled

@@ -41,15 +41,19 @@ def compiled_parallel(function: Function) -> Function:
 
 
 @intrinsic
-def _sqrt(typing, x):
-    def generate(context, builder, signature, arguments):
-        double = ir.DoubleType()
-        function = builder.module.declare_intrinsic("llvm.sqrt", [double])
-        return builder.call(function, arguments)
+def _sqrt(_context: Any, _argument: Any) -> Any:
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        root = builder.module.declare_intrinsic("llvm.sqrt", [ir.DoubleType()])
+        return builder.call(root, arguments)
+
     return numba.float64(numba.float64), generate
 
 
 @compiled
-def square_root(x: float) -> float:
-    """Return the square root, nan of a negative number; math.sqrt calls the C library for that."""
-    return _sqrt(x)
+def square_root(number: float) -> float:
+    """Return the square root, nan of a negative number.
+
+    One instruction; `math.sqrt` asks the C library whenever the number may be negative.
+    """
+    root: float = _sqrt(number)  # type: ignore[call-arg]  # numba gives the context
+    return root

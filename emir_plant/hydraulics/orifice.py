@@ -12,4 +12,5 @@ def turbulent_flow(drop: float, conductance: float) -> float:
     dp = k Q|Q| with conductance = 1/sqrt(k), m^3/(s sqrt(Pa)); made laminar near dp = 0, where
     the square root's slope would be infinite: Q = c dp / (dp^2 + (1 bar)^2)^(1/4).
     """
-    return conductance * drop / square_root(square_root(drop * drop + LAMINAR_BELOW * LAMINAR_BELOW))
+    magnitude = square_root(drop * drop + LAMINAR_BELOW * LAMINAR_BELOW)
+    return conductance * drop / square_root(magnitude)

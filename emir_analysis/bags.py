@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
 from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Footer, McapRecord, Metadata, Schema
+from mcap.records import Attachment, Channel, Footer, McapRecord, Metadata, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
@@ -70,6 +70,17 @@ def metadata(path: Path) -> dict[str, dict[str, str]]:
         for record in records(file)
         if isinstance(record, Metadata)
     }
+
+
+def attachments(path: Path) -> list[Attachment]:
+    """Return the attachments of a recording, each once by its name. Raises InputError as `read`."""
+    found = {
+        record.name: record
+        for file in files(path)
+        for record in records(file)
+        if isinstance(record, Attachment)
+    }
+    return list(found.values())
 
 
 def files(path: Path) -> list[Path]:

@@ -233,6 +233,8 @@ TOPICS: tuple[Topic, ...] = (
     *OFFERED_COMMANDS.values(), SELECTOR_TERMS,
 )  # fmt: skip
 
+DIAGNOSTICS = "/diagnostics"  # diagnostic_msgs/DiagnosticArray: what nodes say of themselves
+ORDERS = "orders"  # the same type: what a node was ordered or had set while it ran
 RECORDED = "recorder/recorded"  # std_msgs/Header: all up to this stamp is in the file (lock step)
 
 

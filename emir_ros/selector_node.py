@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
+from emir_analysis.recorded_orders import SET
 from emir_analysis.switching import Selector, Switch
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
@@ -76,6 +77,7 @@ class SelectorNode(ControlNode):
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
                 self._chosen = parameter.value
+                self.orders.tell(SET, {"controller": self._chosen})
         return SetParametersResult(successful=True)
 
 

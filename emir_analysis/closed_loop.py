@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.disturbance import LoadChange, reloaded
-from emir_analysis.node_controls import force_loop_signals
-from emir_analysis.outer_loop import CascadeLoop, OuterLoop, Situation
+from emir_analysis.node_controls import CascadeControl, Stepping, force_loop_signals, situation
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters, ForceLoopState
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     CYLINDER_MOVE,
     CYLINDER_PREVIEW,
+    CYLINDER_REFERENCE,
     PLANT_PERIOD_NS,
     TRUTH,
 )
@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
 PERIOD = CONTROL_PERIOD_NS * 1e-9
 PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
+REFERENCE_SIGNALS = (
+    *CYLINDER_REFERENCE.fields, *CYLINDER_PREVIEW.fields, *CYLINDER_MOVE.fields,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class ClosedLoop:
 
     plant: Plant
     trajectory: AwayAndBack
-    outer: OuterLoop = field(default_factory=CascadeLoop)
+    outer: Stepping = field(default_factory=CascadeControl)
     force_loop: ForceLoop = field(default_factory=lambda: ForceLoop(ForceLoopParameters()))
     change: LoadChange | None = None
 
@@ -69,19 +72,15 @@ class ClosedLoop:
                 move = self.trajectory.move(following, PERIOD)
                 following, reference = self.trajectory.step(following, here, PERIOD)
 
-                now = Situation(reference, preview, reading, move)
+                now = situation(reference, preview, reading, move)
                 controlling, wanted = self.outer.step(controlling, now, PERIOD)
 
-                signals = {
-                    "reference_stroke": reference.stroke,
-                    "reference_velocity": reference.velocity,
-                }
+                signals = {name: now[name] for name in REFERENCE_SIGNALS}
                 if "velocity_command" in wanted:
                     damping, valve = self._force_loop(damping, wanted["velocity_command"], reading)
                     signals |= valve
-                signals |= wanted | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
-                ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
-                _append(rows, signals | ahead)
+                signals |= wanted
+                _append(rows, signals)
             if tick < last:
                 state, truth = plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}

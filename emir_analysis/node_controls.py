@@ -1,21 +1,24 @@
 """What each control node computes, by the signals of the topic table and without ROS.
 
-The nodes of the graph and the replay of a recording both hold these objects.
+The nodes of the graph, the closed loop without ROS and the replay of a recording hold these
+objects.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from emir_analysis.outer_loop import lqg_signals, pfc_signals
-from emir_control.cascade import Cascade, CascadeInputs
+from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
-from emir_control.lqg import Lqg, LqgInputs
-from emir_control.pfc import Pfc, PfcInputs
+from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
+from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.prefilter import PrefilterParameters, joint_angle, piston_stroke
 from emir_control.scheduled_pfc import ScheduledPfc
+from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import (
+    NO_MOVE,
     AwayAndBack,
     Motion,
     Move,
@@ -43,6 +46,7 @@ from emir_msgs_py.topics import (
     VELOCITY_COMMAND,
     Topic,
 )
+from emir_plant.sensors import Measurement
 
 Signals = dict[str, float]
 Topics = tuple[Topic, ...]
@@ -84,6 +88,15 @@ class Switchable(NodeControl, Protocol):
 
     def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the state whose next command is the one in force."""
+
+
+def situation(
+    reference: Reference, preview: Sequence[float], reading: Measurement, move: Move = NO_MOVE
+) -> Signals:
+    """Return what controllers are told in a period, by signal. preview: strokes to come, m."""
+    wanted = {"reference_stroke": reference.stroke, "reference_velocity": reference.velocity}
+    ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
+    return reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
 
 
 class _Piston:
@@ -164,7 +177,7 @@ class CascadeControl:
 
     inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_STATES)
     outputs: ClassVar[Topics] = (CASCADE_TERMS, VELOCITY_COMMAND)
-    cascade: Cascade
+    cascade: Cascade = Cascade(CascadeParameters())
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
@@ -199,7 +212,7 @@ class PfcControl:
         inputs = self._inputs(signals)
         law: Any = self.pfc
         state, outputs = law.step(state or law.initial(inputs), inputs, dt)
-        return state, pfc_signals("pfc", outputs)
+        return state, _pfc_signals("pfc", outputs)
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -234,7 +247,7 @@ class PfcTipControl:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
-        return state, pfc_signals("pfc_tip", outputs)
+        return state, _pfc_signals("pfc_tip", outputs)
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -249,6 +262,22 @@ class PfcTipControl:
     def _inputs(self, signals: Signals) -> TipInputs:
         measured = signals["angle"], signals["deflection"], signals["force"]
         return TipInputs(_reference(signals), _preview(signals), *measured)
+
+
+@dataclass(frozen=True)
+class ShapedControl:
+    """Conventional control of a shaped reference; no node has it."""
+
+    inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_MOVE, CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (VELOCITY_COMMAND,)
+    shaped: ShapedCascade
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        measured = signals["stroke"], signals["force"]
+        inputs = ShapedInputs(_reference(signals), _move(signals), *measured)
+        state, outputs = self.shaped.step(state or self.shaped.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
 
 
 @dataclass(frozen=True)
@@ -267,14 +296,14 @@ class LqgControl:
         """Return the next state, the command and its terms."""
         inputs = LqgInputs(
             signals["reference_stroke"],
-            Move(*(signals[name] for name in CYLINDER_MOVE.fields)),
+            _move(signals),
             signals["angle"],
             signals["pressure_lifting"],
             signals["pressure_lowering"],
             signals["deflection"],
         )
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, lqg_signals(self.name, outputs)
+        return state, _lqg_signals(self.name, outputs)
 
 
 @dataclass(frozen=True)
@@ -325,3 +354,20 @@ def _reference(signals: Signals) -> Reference:
 
 def _preview(signals: Signals) -> list[float]:
     return [signals[name] for name in CYLINDER_PREVIEW.fields]
+
+
+def _move(signals: Signals) -> Move:
+    return Move(*(signals[name] for name in CYLINDER_MOVE.fields))
+
+
+def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
+    terms = outputs._asdict()
+    command = terms.pop("valve_command")
+    return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
+
+
+def _pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
+    terms = outputs._asdict()
+    command = terms.pop("velocity_command")
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"velocity_command": command} | named

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from emir_analysis.node_controls import NodeControl, Signals, Switchable, Topics
-from emir_analysis.outer_loop import Situation
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (
-    CYLINDER_PREVIEW,
     OFFERED_COMMANDS,
     OUTER_LOOPS,
     SELECTOR_TERMS,
@@ -117,31 +115,21 @@ class Selector:
 
 @dataclass(frozen=True)
 class SwitchedLoop:
-    """The same without ROS, an `OuterLoop`. controls: by name."""
+    """The same without ROS. controls: by name."""
 
     controls: Mapping[str, NodeControl]
     switches: Sequence[Switch]
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, Signals]:
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
         selector = Selector(tuple(self.controls), self.switches)
         begin: tuple[dict[str, Any], int | None, Signals] = ({}, None, {})
         states, ticks, fed_back = state or begin
-        known = _signals(now) | fed_back
+        known = signals | fed_back
         after: dict[str, ReadyState] = {}
         offered: Signals = {}
         for name, control in self.controls.items():
-            after[name], signals = Ready(name, control).step(states.get(name), known, dt)
-            offered |= signals
+            after[name], terms = Ready(name, control).step(states.get(name), known, dt)
+            offered |= terms
         ticks, selected = selector.step(ticks, offered, dt)
         return (after, ticks, selected), offered | selected
-
-
-def _signals(now: Situation) -> Signals:
-    """Return a situation by the names of the topic table."""
-    reference = {
-        "reference_stroke": now.reference.stroke,
-        "reference_velocity": now.reference.velocity,
-    }
-    preview = dict(zip(CYLINDER_PREVIEW.fields, now.preview, strict=True))
-    return now.reading._asdict() | reference | preview

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from emir_analysis.compare import figures, run
-from emir_analysis.outer_loop import CascadeLoop
+from emir_analysis.node_controls import CascadeControl
 from emir_analysis.report import new_figure
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.trajectory import TrajectoryParameters, named
@@ -40,7 +40,7 @@ def curve(machine: Machine, progress: Callable[[str], None]) -> list[Tuning]:
     for gain in GAINS:
         progress(f"k_p = {gain:g} 1/s")
         for slow in TIME_CONSTANTS:
-            loop = CascadeLoop(Cascade(CascadeParameters(gain=gain, time_constant=slow)))
+            loop = CascadeControl(Cascade(CascadeParameters(gain=gain, time_constant=slow)))
             moves = figures(run(machine, trajectory, loop, FORTY_FIVE))
             error, lag = max(m.error for m in moves), max(m.lag for m in moves)
             bending = max(max(m.up, -m.down) for m in moves)

@@ -16,10 +16,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rclpy
 from numpy.typing import NDArray
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 
 from emir_analysis import bags
@@ -130,9 +132,7 @@ def _latency(rate: float, seconds: float) -> Part:
     node = rclpy.create_node("bench_sender")
     wire, kind = Wire(JOINT_STATES), conversions.message_class(JOINT_STATES.type)
     publisher = node.create_publisher(kind, "bench", qos.offered(lockstep=False))
-    until = time.monotonic() + SETTLING
-    while not publisher.get_subscription_count() and time.monotonic() < until:
-        time.sleep(0.01)
+    _find_listener(publisher)
     period, sent = 1.0 / rate, 0
     begin = time.monotonic()
     while sent < rate * seconds:
@@ -208,7 +208,11 @@ def _busy_processors() -> Iterator[None]:
 
 
 def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
-    """Send messages to a recorder of its own process and count what it has recorded."""
+    """Send numbered messages to a recorder of its own process; look for them in its file.
+
+    Sender and recorder find each other while messages are sent already: the first one that is
+    recorded begins the count.
+    """
     words = ["--ros-args", "-p", f"bag:={bag}", "-p", f"topics:=[{JOINT_STATES.name}]"]
     recorder = subprocess.Popen(  # noqa: S603 (our own node)
         [sys.executable, "-P", "-m", "emir_ros.recorder_node", *words]
@@ -216,28 +220,39 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
     rclpy.init()
     node = rclpy.create_node("bench_sender")
     kind = conversions.message_class(JOINT_STATES.type)
-    publisher = node.create_publisher(kind, JOINT_STATES.name, qos.offered(lockstep=False))
+    profile = qos.offered(lockstep=False)
+    profile.depth = max(round(rate * qos.DEPTH * PLANT_PERIOD_NS * 1e-9), 1)
+    publisher = node.create_publisher(kind, JOINT_STATES.name, profile)
+    _find_listener(publisher)
     wire, sent = Wire(JOINT_STATES), 0
-    until = time.monotonic() + SETTLING
-    while not publisher.get_subscription_count() and time.monotonic() < until:
-        time.sleep(0.01)
     begin = time.monotonic()
     while (now := time.monotonic() - begin) < seconds:
         while sent < now * rate:
-            publisher.publish(wire.encode(time.time_ns(), {"angle": 0.0}))
+            publisher.publish(wire.encode(time.time_ns(), {"angle": float(sent)}))
             sent += 1
         time.sleep(1e-4)
-    time.sleep(0.5)
+    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
     recorder.send_signal(signal.SIGINT)
     recorder.wait()
     node.destroy_node()
     rclpy.try_shutdown()
-    recorded = sum(map(len, bags.read(bag).values())) if bag.exists() else 0
+    (recorded,) = bags.read(bag).values()
+    first = int(min(message.data.position[0] for message in recorded))
     return f"Recorder, messages sent for {seconds:g} s", [
         Figure("sent", sent / now, "1/s"),
-        Figure("recorded", recorded / now, "1/s"),
-        Figure("lost", float(sent - recorded), "1"),
+        Figure("recorded", len(recorded) / now, "1/s"),
+        Figure("lost", float(sent - first - len(recorded)), "1"),
+        Figure("sent before the first one recorded", float(first), "1"),
     ]
+
+
+def _find_listener(publisher: Any) -> None:
+    """Wait until somebody listens to what is to be published."""
+    until = time.monotonic() + SETTLING
+    while not publisher.get_subscription_count():
+        if time.monotonic() > until:
+            raise NodeError(f"nobody listens to {publisher.topic_name} within {SETTLING:g} s")
+        time.sleep(0.01)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from emir_analysis.compare import MoveFigures, controllers, figures, run
 from emir_analysis.damping import damping_figures
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.margin import gain_margin, linear_machine
-from emir_analysis.outer_loop import PfcLoop
+from emir_analysis.node_controls import PfcControl
 from emir_control import pfc_file
 from emir_control.design import spectral_radius
 from emir_control.force_loop import ForceLoopParameters
@@ -194,7 +194,7 @@ def test_gain_margin_is_where_the_poles_cross_the_unit_circle() -> None:
     for payload in (0.0, 1500.0):
         point = OperatingPoint(angle=math.radians(60.0), payload=payload)
         linear = linear_machine(joint1(), point)
-        margin = gain_margin(linear, PfcLoop(law))
+        margin = gain_margin(linear, PfcControl(law))
         for factor, stable in ((0.95 * margin, True), (1.05 * margin, False)):
             louder = replace(linear.model, B=factor * linear.model.B)
             assert (spectral_radius(law, louder) < 1.0) == stable

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from emir_analysis.closed_loop import PERIOD, ClosedLoop
-from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop, Situation
+from emir_analysis.node_controls import (
+    CascadeControl,
+    PfcControl,
+    PfcTipControl,
+    Signals,
+    Stepping,
+    situation,
+)
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.limits import LimitParameters, off_the_ends
@@ -17,16 +24,18 @@ from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
 from emir_control.trajectory import Reference, TrajectoryParameters, named
+from emir_msgs_py.topics import CYLINDER_REFERENCE
 from emir_plant import linkage
 from emir_plant.plant import Plant
+from emir_plant.sensors import Measurement
 from emir_plant.sheet import joint1
 
 LIMITS = LimitParameters()
 HOLD = named("hold", TrajectoryParameters())
-LOOPS: dict[str, Callable[[], OuterLoop]] = {
-    "cascade": CascadeLoop,
-    "pfc": lambda: PfcLoop(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
-    "pfc_tip": lambda: PfcTipLoop(
+LOOPS: dict[str, Callable[[], Stepping]] = {
+    "cascade": CascadeControl,
+    "pfc": lambda: PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+    "pfc_tip": lambda: PfcTipControl(
         Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
     ),
 }
@@ -38,8 +47,8 @@ class Commanding:
 
     command: Callable[[int], float]
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
-        """Return the command; see `OuterLoop`."""
+    def step(self, state: Any, now: Signals, dt: float) -> tuple[Any, dict[str, float]]:
+        """Return the command; see `Stepping`."""
         k = state or 0
         return k + 1, {"velocity_command": self.command(k)}
 
@@ -48,14 +57,14 @@ class Commanding:
 class Blind:
     """Another outer loop, whose measurements are not a number for a while; notes its commands."""
 
-    outer: OuterLoop
+    outer: Stepping
     periods: range
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
-        """Return what the other one makes of it; see `OuterLoop`."""
+    def step(self, state: Any, now: Signals, dt: float) -> tuple[Any, dict[str, float]]:
+        """Return what the other one makes of it; see `Stepping`."""
         k, inner = state or (0, None)
         if k in self.periods:
-            now = now._replace(reading=now.reading._make([math.nan] * 6))
+            now = now | dict.fromkeys(Measurement._fields, math.nan)
         inner, signals = self.outer.step(inner, now, dt)
         return (k + 1, inner), signals
 
@@ -126,11 +135,11 @@ def test_a_controller_begun_without_a_number_begins_with_the_first(name: str, lo
 
     state = plant.initial(math.radians(45.0), 2e6)
     reading = measure(plant, plant.outputs(state), 0, state)
-    good = Situation(Reference(reading.stroke, 0.0), (reading.stroke,) * 20, reading)
+    good = situation(Reference(reading.stroke, 0.0), (reading.stroke,) * 20, reading)
     bad = (
-        good._replace(reading=reading._make([math.nan] * 6))
+        good | dict.fromkeys(Measurement._fields, math.nan)
         if lost == "stroke"
-        else good._replace(reference=Reference(math.nan, math.nan))
+        else good | dict.fromkeys(CYLINDER_REFERENCE.fields, math.nan)
     )
     control, signals = outer.step(None, bad, PERIOD)
     assert signals["velocity_command"] == 0.0

@@ -17,7 +17,7 @@ from emir_analysis.design_pfc import (
     design_pfc,
     stability_map,
 )
-from emir_analysis.outer_loop import PfcLoop, PfcTipLoop
+from emir_analysis.node_controls import PfcControl, PfcTipControl
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -146,7 +146,7 @@ def test_the_heavy_and_steep_corner_is_stable_with_it_and_comes_to_rest() -> Non
     machine = with_values(joint1(), {"geometry.payload": 1500.0})
     trajectory = named("lift-lower", TrajectoryParameters(pause=3.0))
     tip = law_of(pfc_file.load(pfc_file.find(SCHEDULED, TIP_ANGLE), TIP_ANGLE))
-    for outer in (PfcLoop(LAW), PfcTipLoop(Tip(tip))):
+    for outer in (PfcControl(LAW), PfcTipControl(Tip(tip))):
         run = ClosedLoop(Plant(machine), trajectory, outer).run(math.radians(60.0), 2e6, 7.2)
         assert np.ptp(run["tcp_deflection"][-125:]) < 0.03  # m, in the last second
         assert run["true_stroke"][-1] == pytest.approx(run["reference_stroke"][-1], abs=4e-3)

@@ -70,11 +70,11 @@ def test_switching_while_moving_is_bumpless(first: str, then: str) -> None:
 
 def test_a_controller_that_was_never_switched_does_what_it_does_alone() -> None:
     """Standing by does not change the one that drives, nor does being chosen from the start."""
-    from emir_analysis.outer_loop import PfcLoop
+    from emir_analysis.node_controls import PfcControl
 
     trajectory = named("lift-lower", TrajectoryParameters())
     loop = SwitchedLoop(CONTROLS, (Switch(0.0, "pfc"),))
-    alone = PfcLoop(CONTROLS["pfc"].pfc)  # type: ignore[attr-defined]
+    alone = PfcControl(CONTROLS["pfc"].pfc)  # type: ignore[attr-defined]
     runs = [
         ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, 4.8)
         for outer in (loop, alone)

@@ -25,8 +25,13 @@ from rosbags.interfaces import QosReliability
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.info import info, parameters_text
 from emir_analysis.machine_model import lqg_parameters
-from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
-from emir_analysis.outer_loop import CascadeLoop, LqgLoop, PfcLoop, PfcTipLoop
+from emir_analysis.node_controls import (
+    CascadeControl,
+    LqgControl,
+    MpcControl,
+    PfcControl,
+    PfcTipControl,
+)
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
@@ -65,13 +70,13 @@ NODES = set(Plan(bag=Path()).nodes) - {"recorder_node"}
 def _loop_signals(controller: str) -> dict[str, np.ndarray]:
     """What the plain loop gives, without ROS."""
     outer = {
-        "cascade": CascadeLoop,
-        "pfc": lambda: PfcLoop(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
-        "pfc_tip": lambda: PfcTipLoop(
+        "cascade": CascadeControl,
+        "pfc": lambda: PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+        "pfc_tip": lambda: PfcTipControl(
             Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
         ),
-        "lqg": lambda: LqgLoop(Lqg(lqg_parameters(joint1()))),
-        "mpc": lambda: LqgLoop(Mpc(lqg_parameters(joint1())), "mpc"),
+        "lqg": lambda: LqgControl(Lqg(lqg_parameters(joint1()))),
+        "mpc": lambda: MpcControl(Mpc(lqg_parameters(joint1()))),
     }[controller]()
     trajectory = named("lift-lower", TrajectoryParameters())
     return ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, DURATION)

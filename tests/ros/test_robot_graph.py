@@ -141,7 +141,7 @@ BAD = {
     "joint 1's parameter": (
         [],
         "plant_node: {ros__parameters: {initial_angle: 0.5}}",
-        "plant_node: initial_angle: there is no such parameter",
+        "plant_node: initial_angle: there is no such parameter; there are .*initial_angles, ",
     ),
     "effect": (
         [],

@@ -33,6 +33,7 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
 from emir_ros import qos
 from emir_ros.graph import Plan
+from emir_ros.main import keep_out_of_garbage_collection
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
 from emir_ros.wire import Wire, stamp_ns
@@ -124,7 +125,11 @@ def _run(plan: Plan, processes: str) -> None:
 
 
 def _latency(rate: float, seconds: float) -> Part:
-    """Measure from before `publish` in one process to the callback in another."""
+    """Measure from before `publish` in one process to the callback in another.
+
+    It begins when the first message has arrived: what is sent while both still get to know each
+    other waits for that.
+    """
     here, there = multiprocessing.get_context("spawn").Pipe()
     listener = multiprocessing.get_context("spawn").Process(target=_listen, args=(there,))
     listener.start()
@@ -133,38 +138,49 @@ def _latency(rate: float, seconds: float) -> Part:
     wire, kind = Wire(JOINT_STATES), conversions.message_class(JOINT_STATES.type)
     publisher = node.create_publisher(kind, "bench", qos.offered(lockstep=False))
     _find_listener(publisher)
+    while not here.poll(0.01):
+        publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
+    here.recv()
+    keep_out_of_garbage_collection()
     period, sent = 1.0 / rate, 0
     begin = time.monotonic()
     while sent < rate * seconds:
         time.sleep(max(begin + sent * period - time.monotonic(), 0.0))
         publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
         sent += 1
+    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
     time.sleep(0.1)
     here.send("enough")
-    late = np.array(here.recv())
+    sent_at, late = np.array(here.recv()).T
     listener.join()
     node.destroy_node()
     rclpy.try_shutdown()
+    late = late[sent_at >= begin]
     title = f"Latency between two processes at {rate:g} Hz"
     return title, [*_spread(late), Figure("lost", 100.0 * (1.0 - late.size / sent), "%")]
 
 
 def _listen(connection: Connection) -> None:
-    """Report how long each message was on its way, s, once told that it is enough."""
+    """Say that a message came, then report when each was sent and how long it took, s."""
     rclpy.init()
     node = rclpy.create_node("bench_listener")
-    late: list[float] = []
+    heard: list[tuple[float, float]] = []
 
     def receive(data: bytes) -> None:
-        late.append((time.monotonic_ns() - stamp_ns(data)) * 1e-9)
+        sent = stamp_ns(data)
+        heard.append((sent * 1e-9, (time.monotonic_ns() - sent) * 1e-9))
 
     kind = conversions.message_class(JOINT_STATES.type)
     node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    keep_out_of_garbage_collection()
+    while not heard:
+        executor.spin_once(timeout_sec=0.1)
+    connection.send("heard")
     while not connection.poll():
         executor.spin_once(timeout_sec=0.1)
-    connection.send(late)
+    connection.send(heard)
     node.destroy_node()
     rclpy.try_shutdown()
 

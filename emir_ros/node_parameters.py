@@ -118,7 +118,19 @@ def reject_unknown(node: Node) -> None:
         if of_a_topic and node.get_parameter("lockstep").value:
             raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
         if not of_a_topic:  # of a topic that another node has
-            raise ParameterError(f"{node.get_name()}: {name}: there is no such parameter")
+            raise ParameterError(
+                f"{node.get_name()}: {name}: there is no such parameter;"
+                f" there are {', '.join(_known_beside(node, name))}"
+            )
+
+
+def _known_beside(node: Node, name: str) -> list[str]:
+    """Return what the node has where an unknown dotted name leaves the known ones."""
+    words = name.split(".")[:-1]
+    while words and not node.get_parameters_by_prefix(".".join(words)):
+        words.pop()
+    known = node.get_parameters_by_prefix(".".join(words))
+    return sorted({path.partition(".")[0] for path in known})
 
 
 def describe(about: Quantity) -> str:

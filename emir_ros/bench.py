@@ -22,7 +22,6 @@ import numpy as np
 import rclpy
 from numpy.typing import NDArray
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 
 from emir_analysis import bags, columns
 from emir_analysis.bench.reading import reading_figures
@@ -34,7 +33,7 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
 from emir_ros import qos
 from emir_ros.graph import Plan
-from emir_ros.main import keep_out_of_garbage_collection
+from emir_ros.main import keep_out_of_garbage_collection, make_executor
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
 from emir_ros.wire import Wire, stamp_ns
@@ -174,14 +173,14 @@ def _listen(connection: Connection) -> None:
 
     kind = conversions.message_class(JOINT_STATES.type)
     node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    keep_out_of_garbage_collection()
-    while not heard:
-        executor.spin_once(timeout_sec=0.1)
-    connection.send("heard")
-    while not connection.poll():
-        executor.spin_once(timeout_sec=0.1)
+    with make_executor() as executor:
+        executor.add_node(node)
+        keep_out_of_garbage_collection()
+        while not heard:
+            executor.spin_once(timeout_sec=0.1)
+        connection.send("heard")
+        while not connection.poll():
+            executor.spin_once(timeout_sec=0.1)
     connection.send(heard)
     node.destroy_node()
     rclpy.try_shutdown()

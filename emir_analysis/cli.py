@@ -194,6 +194,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the way of the robot's TCP")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
     run_report.check_alike(runs)
@@ -202,6 +203,7 @@ def _analyze(words: list[str]) -> int:
         (options.json, run_report.write_json),
         (options.csv, run_report.write_csv),
         (options.html, run_report.write_report),
+        (options.picture, run_report.write_path),
     ):
         if file:
             write(runs, file)

@@ -166,7 +166,7 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
                 for _, message in recorded[f"/{topic.name}"]
             ]
             assert np.array_equal(values, expected[name]), name
-    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop"):
+    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "selector", "force_loop"):
         assert same(replay(bag, node, {})), node
 
 

@@ -363,7 +363,8 @@ def _move(signals: Signals) -> Move:
 def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
     terms = outputs._asdict()
     command = terms.pop("valve_command")
-    return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"valve_command": command} | named
 
 
 def _pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:

@@ -6,7 +6,8 @@ At a move's start the payload is read from the piston force at rest, the move is
     u = u_plan - d - L (x - x_target),    x_target = 0 but for s = f,
 
 with the state x, the unknown force f, flow d and load p estimated by a Kalman filter. The
-drive's inverse (`actuator.py`) turns u into the valve command by the pressures as measured.
+drive's inverse (`actuator.py`) turns u into the valve command by the pressures as they will be
+when it acts: those measured, led on by the commands under way and the plan.
 """
 
 import math
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
-from emir_control.motion_plan import MotionPlan, Target, planned, resting
+from emir_control.limits import LimitParameters, off_the_ends
+from emir_control.motion_plan import MotionPlan, Planner, Target, resting
 from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
 from emir_control.regulator import Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
@@ -69,11 +71,12 @@ class LqgParameters:
     period: float = 0.032
     actuator: ActuatorParameters = field(default_factory=ActuatorParameters)
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
+    limits: LimitParameters = field(default_factory=LimitParameters)
     softness: float = quantity(
         "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
     )
     allowance: float = quantity(
-        "1", 0.0, 1.0, "of the plan's deflection over the smallest, for smoothness", default=0.055
+        "1", 0.0, 1.0, "of the plan's deflection over the smallest, for less travel", default=0.03
     )
     friction: float = quantity("N", 0.0, 1e5, "expected at the move's start", default=3e3)
     hysteresis: float = quantity("1", 0.0, 0.1, "width of the spool's play", default=0.01)
@@ -116,7 +119,9 @@ class LqgState(NamedTuple):
     """Where the control stands.
 
     offset: of the measured bending, rad, in
-    gravity of cos(alpha) = 1. estimate: (n,) x. past: u off the plan, m/s, the newest first.
+    gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
+    of the valve of commands that are under way, the newest first. cut: the move was to end too
+    near to an end of the stroke.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -128,10 +133,12 @@ class LqgState(NamedTuple):
     rest: Rest
     estimate: Array
     past: tuple[float, ...]
+    openings: tuple[float, ...]
     logic: float
     command: float
     moving: bool
     filled: Filled
+    cut: bool = False
 
 
 class LqgInputs(NamedTuple):
@@ -155,6 +162,7 @@ class LqgOutputs(NamedTuple):
     force: float  # f, N
     payload: float  # kg
     deflection: float  # dynamic, of the TCP, as estimated, m
+    limited: bool = False  # off an end of the stroke: the command, or the move as planned
 
 
 class Now(NamedTuple):
@@ -201,14 +209,20 @@ class Lqg:
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
-        arrived = time >= plan.duration
+        arrived = time >= plan.ends
         estimate = self._corrected(state, inputs, target, arrived=arrived)
         from_plan = plan.velocity(time + self._late, dt)
-        logic = max(state.logic, LEAST_OPEN)
-        oil = Oil(target.stroke, inputs.pressure_lifting, inputs.pressure_lowering, logic)
+        measured = inputs.pressure_lifting, inputs.pressure_lowering, state.logic
+        oil = _open(self._acting(state, Oil(target.stroke, *measured), time, dt))
         wanted = from_plan + self._feedback(state, estimate, Now(time + self._late, dt, oil))
+        allowed = self._allowed(wanted, inputs.angle)
+        limited, wanted = state.cut or allowed != wanted, allowed
         shut = self._resting(law, estimate, wanted, arrived=arrived)
         opening = 0.0 if shut else self.drive.opening(wanted, oil)
+        if opening:  # the pressures change while it acts
+            velocity = plan.piston(time + self._late, 0.5 * dt)
+            oil = _open(self.drive.ahead(oil, opening, velocity, 0.5 * dt))
+            opening = self.drive.opening(wanted, oil)
         given = self.drive.velocity(opening, oil) - from_plan
         after = self._moved(state, estimate, given, opening, inputs)
         outputs = LqgOutputs(
@@ -219,6 +233,7 @@ class Lqg:
             float(estimate[law.force]) * plan.stiffness,
             state.payload,
             float(law.deflection @ self._off(state, estimate)[: law.modes]),
+            limited,
         )
         return after, outputs
 
@@ -231,6 +246,17 @@ class Lqg:
     def _late(self) -> float:
         """From measurement to spool, s."""
         return self.parameters.regulator.delay + self.drive.lag
+
+    def _acting(self, state: LqgState, oil: Oil, time: float, dt: float) -> Oil:
+        """Return the oil when the command of this period begins to act."""
+        whole, part = divmod(self._late, dt)
+        spans = [part, *[dt] * int(whole)]
+        for span, opening in zip(spans, reversed(state.openings), strict=True):
+            for half in (time, time + 0.5 * span):
+                velocity = state.plan.piston(half, 0.5 * span)
+                oil = self.drive.ahead(oil, opening, velocity, 0.5 * span)
+            time += span
+        return oil
 
     def _waiting(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, LqgOutputs]:
         """Return the shut valve of a move that is planned and has not begun."""
@@ -295,11 +321,13 @@ class Lqg:
         """Return the state at the start of a move, or of a rest, with what was read at rest."""
         p, drive, move = self.parameters, self.drive, inputs.move
         linkage = p.actuator.static
-        start = inputs.reference
+        ends = inputs.reference, inputs.reference + move.distance
+        start, end = here, _ = self._off_the_ends(rest, ends)
+        cut = (start, end) != ends
         if move.distance and filled.moved:
             start = piston_stroke(rest.angle, linkage)
-            move = move._replace(distance=move.distance + inputs.reference - start)
-        angle = joint_angle(inputs.reference, linkage)
+        move = move._replace(distance=end - start)
+        angle = joint_angle(here, linkage)
         torque = rest.force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
         payload = p.boom.payload(torque)
         boom = p.boom.loaded(payload)
@@ -311,14 +339,32 @@ class Lqg:
         hanging = float(plan.bending[0]) / math.cos(float(plan.angle[0]))
         offset = rest.bending / math.cos(angle) - hanging
         past = (0.0,) * law.delays
-        memory = past, logic, command, move.distance != 0.0, filled
+        memory = past, past, logic, command, inputs.move.distance != 0.0, filled, cut
         return LqgState(plan, law, payload, offset, rest, estimate, *memory)
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
             return resting(boom, self.drive, start)
-        allowance = self.parameters.allowance
-        return planned(boom, self.drive, start, move, allowance)
+        p = self.parameters
+        return Planner(self.drive, p.period, self._late, p.allowance).plan(boom, start, move)
+
+    def _off_the_ends(self, rest: Rest, ends: tuple[float, float]) -> tuple[float, float]:
+        """Return start and end of a move, m, kept off the ends of the stroke.
+
+        Who stands beyond the margin may stay there.
+        """
+        p = self.parameters.limits
+        here = piston_stroke(rest.angle, self.parameters.actuator.static)
+        low = min(p.stroke_low + p.end_margin, here)
+        high = max(p.stroke_high - p.end_margin, here)
+        start, end = (min(max(place, low), high) for place in ends)
+        return start, end
+
+    def _allowed(self, wanted: float, angle: float) -> float:
+        """Return what of a velocity u, m/s, keeps within the limits at a measured angle, rad."""
+        p = self.parameters.limits
+        stroke = piston_stroke(angle, self.parameters.actuator.static)
+        return off_the_ends(min(max(wanted, -p.speed), p.speed), stroke, 0.0, p)
 
     def _corrected(
         self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
@@ -372,4 +418,15 @@ class Lqg:
         if command not in {state.command, 0.0}:  # the spool's play, taken up ahead
             command += math.copysign(0.5 * self.parameters.hysteresis, command - state.command)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, period)
-        return state._replace(estimate=ahead, past=given_all[:-1], logic=logic, command=command)
+        return state._replace(
+            estimate=ahead,
+            past=given_all[:-1],
+            openings=(opening, *state.openings)[:-1],
+            logic=logic,
+            command=command,
+        )
+
+
+def _open(oil: Oil) -> Oil:
+    """Return the oil with a logic block that is not shut, as the drive's inverse wants it."""
+    return oil._replace(logic=max(oil.logic, LEAST_OPEN))

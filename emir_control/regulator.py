@@ -37,19 +37,23 @@ class RegulatorParameters:
 
     modes: int = quantity("1", 2, 16, "of the boom in the model", default=3)
     delay: float = quantity("s", 0.0, 0.2, "from measurement to valve current", default=0.0)
-    flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=1e-4)
+    flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=3e-4)
     load_drift: float = quantity("N", 1e-3, 1e6, "of p, at rest", default=5.0)
     moving_load_drift: float = quantity("N", 1e-3, 1e6, "of p, moving", default=0.2)
-    force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=1e-5)
-    velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=1e-3)
+    force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=2e-5)
+    velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=2e-3)
     angle_noise: float = quantity(
-        "rad", 1e-7, 0.1, "of the resolver; 12 bits of a turn", default=4.4e-4
+        "rad",
+        1e-7,
+        0.1,
+        "of the resolver; a step of 12 bits, which is no white noise",
+        default=1.5e-3,
     )
     bending_noise: float = quantity("rad", 1e-7, 0.1, "of the strain gauges", default=3e-5)
     force_noise: float = quantity("N", 1.0, 1e6, "of the force by pressures", default=1.5e3)
     deflection_weight: float = quantity("m", 1e-5, 1.0, "dynamic deflection", default=1e-3)
-    position_weight: float = quantity("m", 1e-5, 1.0, "TCP off its place", default=1.5e-2)
-    velocity_weight: float = quantity("m/s", 1e-5, 1.0, "u off the plan", default=2.5e-3)
+    position_weight: float = quantity("m", 1e-5, 1.0, "TCP off its place", default=2e-2)
+    velocity_weight: float = quantity("m/s", 1e-5, 1.0, "u off the plan", default=4e-3)
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -57,6 +57,7 @@ LQG_MEANINGS = {
     "force": "unknown force on the piston, friction for one, estimated",
     "payload": "payload at the TCP, read from the piston force at rest",
     "deflection": "the TCP's dynamic deflection off the plan, estimated",
+    "limited": "1 where command or plan is held off an end of the stroke",
 }
 MEANINGS |= {
     f"{name}_{term}": text for name in ("lqg", "mpc") for term, text in LQG_MEANINGS.items()

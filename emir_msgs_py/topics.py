@@ -210,7 +210,7 @@ def _pfc_terms(name: str, output_unit: str) -> Topic:
 
 def _lqg_terms(name: str) -> Topic:
     terms = dict.fromkeys(("planned", "wanted", "flow"), "m/s")
-    terms |= {"force": "N", "payload": "kg", "deflection": "m"}
+    terms |= {"force": "N", "payload": "kg", "deflection": "m", "limited": "1"}
     units = {f"{name}_{term}": unit for term, unit in terms.items()}
     return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
 

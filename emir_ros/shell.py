@@ -405,7 +405,12 @@ class ControlNode(Shell):
                 Level.ERROR, f"{self.consequence}: {', '.join(bad)} {verb} not a number"
             )
         else:
-            self.diagnostics.say(Level.OK, self.status())
+            caution = self.caution(outputs)
+            self.diagnostics.say(Level.WARN if caution else Level.OK, caution or self.status())
+
+    def caution(self, outputs: Signals) -> str:
+        """Return why the outputs are not what was asked for, if they are not."""
+        return ""
 
     def status(self) -> str:
         """Return what there is to say while all is well."""

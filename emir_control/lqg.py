@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
+SURPRISE_SHARE = 0.2  # of a period in the mean surprise
+SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +91,13 @@ class LqgParameters:
     lead: float = quantity("s", 0.1, 10.0, "before the move, when it is planned", default=0.6)
     fill: FillParameters = field(default_factory=FillParameters)
     reading_time: float = quantity(
-        "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=2.0
+        "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=1.0
+    )
+    settling: float = quantity(
+        "s", 0.0, 10.0, "from a move's end to the rest after it", default=1.0
+    )
+    other_load: float = quantity(
+        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=1.2e4
     )
 
     def __post_init__(self) -> None:
@@ -121,7 +129,8 @@ class LqgState(NamedTuple):
     offset: of the measured bending, rad, in
     gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
     of the valve of commands that are under way, the newest first. cut: the move was to end too
-    near to an end of the stroke.
+    near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
+    seems to come or to go.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -139,6 +148,8 @@ class LqgState(NamedTuple):
     moving: bool
     filled: Filled
     cut: bool = False
+    surprise: float = 1.0
+    loaded: bool = False
 
 
 class LqgInputs(NamedTuple):
@@ -210,7 +221,9 @@ class Lqg:
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
         arrived = time >= plan.ends
-        estimate = self._corrected(state, inputs, target, arrived=arrived)
+        estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
+        loaded = surprise > (1.0 if state.loaded else SURPRISE)
+        state = state._replace(surprise=surprise, loaded=loaded)
         from_plan = plan.velocity(time + self._late, dt)
         measured = inputs.pressure_lifting, inputs.pressure_lowering, state.logic
         oil = _open(self._acting(state, Oil(target.stroke, *measured), time, dt))
@@ -298,22 +311,35 @@ class Lqg:
 
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
-        if inputs.move.distance and inputs.move.since >= -self.parameters.lead:
+        p, move = self.parameters, inputs.move
+        if move.distance and -p.lead <= move.since < move.duration + p.settling:
             if state.moving:
                 return state
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
-        count = 1 if state.moving else state.rest.periods + 1
-        weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
+        enough = round(p.reading_time / p.period)
         last = state.rest
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        other = abs(force - last.force) > p.other_load
+        count = 1 if state.moving or other else last.periods + 1
+        weight = 1.0 / min(count, enough)
         rest = last._replace(periods=count, angle=last.angle + weight * (inputs.angle - last.angle))
         if not state.filled.moved or state.moving:  # what was read before still holds
-            force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
             rest = rest._replace(
                 force=last.force + weight * (force - last.force),
                 bending=last.bending + weight * (inputs.deflection - last.bending),
             )
         filled = NOT_FILLED if state.moving else state.filled
+        off = rest.force - state.plan.at(math.inf).force
+        if count == enough and abs(off) > p.other_load and not filled.moved:
+            resting_on = inputs._replace(move=NO_MOVE)
+            return self._begin(rest, resting_on, state.logic, state.command, filled)
         return state._replace(rest=rest, moving=False, filled=filled)
+
+    def _payload(self, force: float, angle: float) -> float:
+        """Return the payload, kg, that a force at rest, N, holds at an angle of the joint, rad."""
+        linkage = self.parameters.actuator.static
+        torque = force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
+        return self.parameters.boom.payload(torque)
 
     def _begin(
         self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
@@ -328,8 +354,7 @@ class Lqg:
             start = piston_stroke(rest.angle, linkage)
         move = move._replace(distance=end - start)
         angle = joint_angle(here, linkage)
-        torque = rest.force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
-        payload = p.boom.payload(torque)
+        payload = self._payload(rest.force, angle)
         boom = p.boom.loaded(payload)
         plan = self._plan(boom, start, move)
         law = regulator(boom, drive, start + 0.5 * move.distance, p.period, p.regulator)
@@ -368,8 +393,8 @@ class Lqg:
 
     def _corrected(
         self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
-    ) -> Array:
-        """Return x corrected by what is measured."""
+    ) -> tuple[Array, float]:
+        """Return x corrected by what is measured, and the mean surprise."""
         law = state.regulator
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         bending = target.bending + state.offset * math.cos(target.angle)
@@ -378,8 +403,12 @@ class Lqg:
             inputs.deflection - bending,
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
-        gain = law.kalman_at_rest if arrived else law.kalman
-        return state.estimate + gain @ (measured - law.C @ state.estimate)
+        innovation = measured - law.C @ state.estimate
+        known = law.at_rest if arrived else law.moving
+        squared = float(innovation @ known.certainty @ innovation) / len(innovation)
+        surprise = state.surprise + SURPRISE_SHARE * (squared - state.surprise)
+        gain = known.loaded if state.loaded else known.gain
+        return state.estimate + gain @ innovation, surprise
 
     def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""

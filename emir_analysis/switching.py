@@ -10,7 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from emir_analysis.node_controls import NodeControl, Signals, Switchable, Topics
+from emir_analysis.node_controls import (
+    NodeControl,
+    Signals,
+    Switchable,
+    TakesOverAtRest,
+    Topics,
+)
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (
     OFFERED_COMMANDS,
@@ -40,6 +46,8 @@ class Ready:
 
         A controller that is not `Switchable` begins anew when it is chosen.
         """
+        if isinstance(self.control, TakesOverAtRest):
+            return self._step_at_rest(self.control, state, signals, dt)
         before = start = self._caught_up(state, signals, dt)
         stands_by = before is not None and not self._drives(signals)
         if stands_by and isinstance(self.control, Switchable):
@@ -48,6 +56,17 @@ class Ready:
         offered = {f"{self.name}_command": outputs["velocity_command"]}
         terms = {name: value for name, value in outputs.items() if name != "velocity_command"}
         return ReadyState(before, own, signals), terms | offered
+
+    def _step_at_rest(
+        self, control: TakesOverAtRest, state: ReadyState | None, signals: Signals, dt: float
+    ) -> tuple[ReadyState, Signals]:
+        own = state.own if state else None
+        if self._drives(signals):
+            own, outputs = control.step(own, signals, dt)
+        else:
+            own, outputs = control.stand_by(own, signals)
+        terms = {name: value for name, value in outputs.items() if name != "valve_command"}
+        return ReadyState(None, own, signals), terms
 
     def _caught_up(self, state: ReadyState | None, signals: Signals, dt: float) -> Any:
         """Return the controller's state after the period that has passed."""
@@ -96,10 +115,19 @@ class Selector:
         if times != sorted(set(times)) or times[:1] != [0.0]:
             raise ParameterError(f"times of switching {times}: have to rise from 0 s")
 
-    def step(self, state: int | None, signals: Signals, dt: float) -> tuple[int, Signals]:
-        """Return the number of periods and the command of the controller whose time it is."""
-        ticks = state or 0
-        return ticks + 1, self.selected(self.due(ticks, dt), signals)
+    def step(
+        self, state: tuple[int, str] | None, signals: Signals, dt: float
+    ) -> tuple[tuple[int, str], Signals]:
+        """Return the number of periods and who drives, and the command of that one."""
+        ticks, driving = state or (0, self.due(0, dt))
+        driving = self.driver(driving, self.due(ticks, dt), signals)
+        return (ticks + 1, driving), self.selected(driving, signals)
+
+    @staticmethod
+    def driver(driving: str, wanted: str, signals: Signals) -> str:
+        """Return who drives: the one that is wanted, as soon as it is ready."""
+        ready = signals.get(f"{wanted}_ready", 1.0) == 1.0
+        return wanted if ready and f"{wanted}_command" in signals else driving
 
     def due(self, ticks: int, dt: float) -> str:
         """Return who drives after a number of periods of dt, s, by the switches alone."""
@@ -123,13 +151,13 @@ class SwitchedLoop:
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
         selector = Selector(tuple(self.controls), self.switches)
-        begin: tuple[dict[str, Any], int | None, Signals] = ({}, None, {})
-        states, ticks, fed_back = state or begin
+        begin: tuple[dict[str, Any], tuple[int, str] | None, Signals] = ({}, None, {})
+        states, driving, fed_back = state or begin
         known = signals | fed_back
         after: dict[str, ReadyState] = {}
         offered: Signals = {}
         for name, control in self.controls.items():
             after[name], terms = Ready(name, control).step(states.get(name), known, dt)
             offered |= terms
-        ticks, selected = selector.step(ticks, offered, dt)
-        return (after, ticks, selected), offered | selected
+        driving, selected = selector.step(driving, offered, dt)
+        return (after, driving, selected), offered | selected

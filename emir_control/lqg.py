@@ -30,6 +30,7 @@ from emir_control.trajectory import NO_MOVE, Move
 Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
+STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
 SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
@@ -130,7 +131,7 @@ class LqgState(NamedTuple):
     gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
     of the valve of commands that are under way, the newest first. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
-    seems to come or to go.
+    seems to come or to go. reference: m, of the last period of standing by.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -150,6 +151,7 @@ class LqgState(NamedTuple):
     cut: bool = False
     surprise: float = 1.0
     loaded: bool = False
+    reference: float = math.nan
 
 
 class LqgInputs(NamedTuple):
@@ -250,6 +252,23 @@ class Lqg:
         )
         return after, outputs
 
+    def stand_by(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, bool]:
+        """Return the next state while another one drives, and whether this one may take over.
+
+        It may where the reference has rested for long enough to read the payload, swinging boom or
+        not.
+        """
+        if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
+            return state._replace(reference=math.nan), False
+        moves = inputs.reference != state.reference or self._under_way(inputs.move)
+        enough = STANDING_BY * self._enough
+        rest = self._read(state.rest, inputs, 1 if moves else state.rest.periods + 1, enough)
+        logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
+        state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
+        if rest.periods == enough:
+            state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
+        return state._replace(reference=inputs.reference), rest.periods >= enough
+
     @property
     def _begins(self) -> float:
         """When the plan's first command has to be given, s since the move's start."""
@@ -311,29 +330,41 @@ class Lqg:
 
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
-        p, move = self.parameters, inputs.move
-        if move.distance and -p.lead <= move.since < move.duration + p.settling:
+        p = self.parameters
+        if self._under_way(inputs.move):
             if state.moving:
                 return state
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
-        enough = round(p.reading_time / p.period)
         last = state.rest
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         other = abs(force - last.force) > p.other_load
         count = 1 if state.moving or other else last.periods + 1
-        weight = 1.0 / min(count, enough)
-        rest = last._replace(periods=count, angle=last.angle + weight * (inputs.angle - last.angle))
-        if not state.filled.moved or state.moving:  # what was read before still holds
-            rest = rest._replace(
-                force=last.force + weight * (force - last.force),
-                bending=last.bending + weight * (inputs.deflection - last.bending),
-            )
+        rest = self._read(last, inputs, count, self._enough)
+        if state.filled.moved and not state.moving:  # what was read before still holds
+            rest = rest._replace(force=last.force, bending=last.bending)
         filled = NOT_FILLED if state.moving else state.filled
         off = rest.force - state.plan.at(math.inf).force
-        if count == enough and abs(off) > p.other_load and not filled.moved:
+        if count == self._enough and abs(off) > p.other_load and not filled.moved:
             resting_on = inputs._replace(move=NO_MOVE)
             return self._begin(rest, resting_on, state.logic, state.command, filled)
         return state._replace(rest=rest, moving=False, filled=filled)
+
+    @property
+    def _enough(self) -> int:
+        """Control periods over which is read at rest."""
+        return round(self.parameters.reading_time / self.parameters.period)
+
+    def _read(self, last: Rest, inputs: LqgInputs, count: int, most: int) -> Rest:
+        """Return the means at rest with a further reading, the count-th, of the most that count."""
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        now = Rest(count, force, inputs.deflection, inputs.angle)
+        weight = 1.0 / min(count, most)
+        return Rest(count, *(a + weight * (b - a) for a, b in zip(last[1:], now[1:], strict=True)))
+
+    def _under_way(self, move: Move) -> bool:
+        """Tell whether a move is to be planned or made, or has just ended."""
+        p = self.parameters
+        return bool(move.distance) and -p.lead <= move.since < move.duration + p.settling
 
     def _payload(self, force: float, angle: float) -> float:
         """Return the payload, kg, that a force at rest, N, holds at an angle of the joint, rad."""

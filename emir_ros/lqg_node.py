@@ -21,7 +21,8 @@ class LqgNode(ControlNode):
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         kind = self.control_class
         super().__init__(f"{kind.name}_node", kind.inputs, kind.outputs, arguments)
-        self.law = kind(self.law_class(declare_tree(self, lqg_parameters(joint1()))))
+        law = kind(self.law_class(declare_tree(self, lqg_parameters(joint1()))))
+        self.law = self.standing_by(law)
         reject_unknown(self)
 
     def caution(self, outputs: Signals) -> str:

@@ -40,8 +40,9 @@ class SelectorNode(ControlNode):
             raise ParameterError(f"selector_node: {error}") from None
         about = f"which one drives, of {', '.join(names)}; may be set at any time"
         self.declare_parameter("controller", switched[0], ParameterDescriptor(description=about))
-        self._chosen: str = self.get_parameter("controller").value
-        self._check(self._chosen)
+        self._wanted: str = self.get_parameter("controller").value
+        self._check(self._wanted)
+        self._drives = self._wanted
         self.add_on_set_parameters_callback(self._on_set)
         self._ticks = 0
         reject_unknown(self)
@@ -52,17 +53,19 @@ class SelectorNode(ControlNode):
         """Return the command of the controller that is chosen."""
         due = self.selector.due(self._ticks, dt)
         if self._ticks and due != self.selector.due(self._ticks - 1, dt):
-            self._chosen = due
+            self._wanted = due
         self._ticks += 1
-        return self.selector.selected(self._chosen, signals)
+        self._drives = self.selector.driver(self._drives, self._wanted, signals)
+        return self.selector.selected(self._drives, signals)
 
     def needed(self) -> Collection[str]:
         """Return the one command that matters; the others may be missing."""
-        return (OFFERED_COMMANDS[self._chosen].name,)
+        return (OFFERED_COMMANDS[self._drives].name,)
 
     def status(self) -> str:
         """Return who drives."""
-        return f"{self._chosen} drives the machine"
+        waits = f"; {self._wanted} will, at rest" if self._wanted != self._drives else ""
+        return f"{self._drives} drives the machine{waits}"
 
     def _check(self, name: str) -> None:
         if name not in self.selector.controllers:
@@ -76,8 +79,8 @@ class SelectorNode(ControlNode):
                     self._check(parameter.value)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self._chosen = parameter.value
-                self.orders.tell(SET, {"controller": self._chosen})
+                self._wanted = parameter.value
+                self.orders.tell(SET, {"controller": self._wanted})
         return SetParametersResult(successful=True)
 
 

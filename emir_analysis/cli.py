@@ -194,6 +194,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the way of the robot's TCP")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
     run_report.check_alike(runs)
@@ -202,6 +203,7 @@ def _analyze(words: list[str]) -> int:
         (options.json, run_report.write_json),
         (options.csv, run_report.write_csv),
         (options.html, run_report.write_report),
+        (options.picture, run_report.write_path),
     ):
         if file:
             write(runs, file)
@@ -229,7 +231,9 @@ def _compare(words: list[str]) -> int:
     parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
-    parser.add_argument("--trade-off", action="store_true", help="instead: cascade over k_p and T")
+    parser.add_argument(
+        "--trade-off", action="store_true", help="instead: cascade over k_p and T, others"
+    )
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )

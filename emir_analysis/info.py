@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.records import Channel, Message, Metadata, Schema
+from mcap.records import Channel, Metadata, Schema
 
 from emir_analysis import bags
 
@@ -101,7 +101,7 @@ def _count(file: Path, found: Info) -> None:
             kind = types.get(record.schema_id, "unknown type")
             new = TopicInfo(kind, json.loads(record.metadata.get(FIELDS, "{}")))
             topics[record.id] = found.topics.setdefault(record.topic, new)
-        elif isinstance(record, Message) and record.channel_id in topics:
+        elif isinstance(record, bags.Raw) and record.channel_id in topics:
             topics[record.channel_id].add(record.log_time)
         elif isinstance(record, Metadata) and record.name == DESCRIPTION:
             found.about.update(record.metadata)

@@ -175,6 +175,32 @@ class Actuator:
             self.next_logic(oil.logic, at.lifting, dt),
         )
 
+    def supply_needed(self, force: float, velocity: float) -> float:
+        """Return the pump's pressure, Pa, that a steady motion takes with the valve fully open.
+
+        force: on the piston, N. velocity: m/s; at rest the shut valve holds, and it is 0.
+        """
+        p, s = self.parameters, self.parameters.static
+        if velocity == 0.0:
+            return 0.0
+        into, out, edge, flow = s.area_lifting, s.area_lowering, p.edge_lifting, s.flow_lifting
+        if velocity < 0.0:
+            into, out, edge, flow = out, into, p.edge_lowering + p.block_out, s.flow_lowering
+        back = p.tank + (edge + p.return_line) * (out * velocity) ** 2
+        pushed = ((force if velocity > 0.0 else -force) + back * out) / into
+        return pushed + (p.pump_line + p.balance / flow**2) * (into * velocity) ** 2
+
+    def pumped(self, velocity: float) -> float:
+        """Return what the pump has to give for a velocity, m/s, in steady motion, m^3/s."""
+        s = self.parameters.static
+        return velocity * s.area_lifting if velocity > 0.0 else -velocity * s.area_lowering
+
+    @cached_property
+    def fastest(self) -> float:
+        """What the fully open valve gives the piston, lifting, m/s."""
+        s = self.parameters.static
+        return s.flow_lifting / s.area_lifting
+
     def next_logic(self, logic: float, lifting: float, dt: float) -> float:
         """Return the logic block's opening dt, s, later, p_H being the pressure, Pa."""
         p = self.parameters

@@ -24,6 +24,8 @@ MEANINGS = {
     "tcp_deflection": "deflection of the tool centre point across the boom",
     "reference_stroke": "demanded piston stroke h_d",
     "reference_velocity": "demanded piston velocity dh_d/dt",
+    "reference_force": "force of the piston that the demanded motion is expected to take",
+    "expected_force": "force of the piston that the motion asked for is expected to take",
     "velocity_command": "piston velocity that the outer controller asks for",
     "valve_command": "commanded opening of the valve, -1 to 1",
     "feedforward": "share of the cascade's command from the demanded velocity",

@@ -42,14 +42,20 @@ def _units(joint: str, unit: str) -> str:
 
 
 def _six(
-    topic: Topic, frame: str, *quantities: tuple[str, str, str], every: Every | None = None
+    topic: Topic,
+    frame: str,
+    *quantities: tuple[str, str, str],
+    every: Every | None = None,
+    optional: Sequence[str] = (),
 ) -> Topic:
     """Return a topic of joint 1 for six: quantities are (signal, array of the message, unit).
 
-    every: its period, if that is another.
+    every: its period, if that is another. optional: signals that are 0 where they are left out.
     """
     fields = {
-        f"{joint}_{signal}": Field(f"{array}[{i}]", _units(joint, unit))
+        f"{joint}_{signal}": Field(
+            f"{array}[{i}]", _units(joint, unit), 0.0 if signal in optional else None
+        )
         for signal, array, unit in quantities
         for i, joint in enumerate(JOINTS)
     }
@@ -99,9 +105,14 @@ ROBOT_TRUTH = named_numbers(
 ROBOT_CYLINDER_REFERENCE = _six(
     CYLINDER_REFERENCE, GROUND,
     ("reference_stroke", "position", "m"), ("reference_velocity", "velocity", "m/s"),
+    ("reference_force", "effort", "N"),
 )  # fmt: skip
 TCP_REFERENCE = _pose("tcp_reference", "trajectory_node", "tcp_reference", "command")
-ROBOT_VELOCITY_COMMAND = _six(VELOCITY_COMMAND, GROUND, ("velocity_command", "velocity", "m/s"))
+ROBOT_VELOCITY_COMMAND = _six(
+    VELOCITY_COMMAND, GROUND,
+    ("velocity_command", "velocity", "m/s"), ("expected_force", "effort", "N"),
+    optional=("expected_force",),
+)  # fmt: skip
 ROBOT_VALVE_COMMAND = _six(VALVE_COMMAND, GROUND, ("valve_command", "position", "1"), every="plant")
 ROBOT_CASCADE_TERMS = _terms(
     "cascade/terms", "cascade_node", "control",

@@ -22,10 +22,14 @@ CONTROL_PERIOD_NS = 32_000_000  # paper 3.2
 
 @dataclass(frozen=True)
 class Field:
-    """Where a signal stands in its message (`position[0]`, `fluid_pressure`) and its unit."""
+    """Where a signal stands in its message (`position[0]`, `fluid_pressure`) and its unit.
+
+    absent: its value where a message leaves it out; None: that is an error.
+    """
 
     path: str
     unit: str
+    absent: float | None = None
 
 
 @dataclass(frozen=True)

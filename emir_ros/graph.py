@@ -136,18 +136,23 @@ def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
 
 
 def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
-    """Return how long the robot's trajectory takes, s, from where it is to start."""
+    """Return how long the robot's trajectory takes, s, from where and with what it is to start."""
+    own = {k: v for k, v in given.get(EVERY_NODE, {}).items() if k in ROBOT_FILES} | own
     files = (Path(name) if name else None for name in (own.pop(key, "") for key in ROBOT_FILES))
     sheet = robot(*files)
+    plant = given.get("plant_node", {})
     path = path_parameters(sheet)
+    if own.get("weigh", path.weigh):
+        load = plant.get("geometry.payload", sheet.main.geometry.payload)
+        load += plant.get("effects.payload.mass", sheet.main.effects.payload.mass)
+        path = with_values(path, {"arm.payload": float(load)})
+    path = with_values(path, {"supply": float(plant.get("supply.p0", path.supply))})
     of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
     move = with_values(TrajectoryParameters(), own)
     planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
     front = "initial_angles."
     angles = {
-        name.removeprefix(front): value
-        for name, value in given.get("plant_node", {}).items()
-        if name.startswith(front)
+        name.removeprefix(front): value for name, value in plant.items() if name.startswith(front)
     }
     start = RobotTrajectoryInputs(with_values(Posture(), angles).angles)
     return planned.initial(start).timing.duration
@@ -204,7 +209,7 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
     nodes: dict[str, dict[str, Any]] = {
         EVERY_NODE: {"lockstep": plan.lockstep, "model": plan.model},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
-        "trajectory_node": {"trajectory": plan.trajectory},
+        "trajectory_node": _trajectory_parameters(plan),
         "recorder_node": {
             "bag": str(plan.bag),
             "description": json.dumps(_description(plan)),
@@ -220,6 +225,16 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
         node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
         for node, values in nodes.items()
     }
+
+
+def _trajectory_parameters(plan: Plan) -> dict[str, Any]:
+    """Return the trajectory's name and, if another than the sheet's, the robot's pump pressure."""
+    given = read_parameters(plan.params)
+    pressure = given.get("plant_node", {}).get("supply.p0")
+    if plan.model != ROBOT or pressure is None:
+        return {"trajectory": plan.trajectory}
+    supply = given.get("trajectory_node", {}).get("supply", pressure)
+    return {"trajectory": plan.trajectory, "supply": float(supply)}
 
 
 def _from_the_start(plan: Plan) -> list[Switch]:

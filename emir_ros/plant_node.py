@@ -21,7 +21,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
-from emir_ros.wire import Wire, stamp_ns
+from emir_ros.wire import Wire, clock_message, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -116,9 +116,7 @@ class PlantNode(Shell):
 
     def _publish_tick(self) -> None:
         self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
-        clock = ClockMessage()
-        clock.clock.sec, clock.clock.nanosec = divmod(stamp, conversions.NANOSECONDS)
-        self._clock_publisher.publish(clock)
+        self._clock_publisher.publish(clock_message(stamp))
         self._publish_sensors(stamp)
 
     def _on_recorded(self, message: Header) -> None:

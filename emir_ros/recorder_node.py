@@ -49,16 +49,19 @@ from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
 from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
-from emir_ros.wire import stamp_ns
+from emir_ros.wire import header_message, stamp_ns
 
 PLANT = "plant_node"  # tells the robot description
 EVENTS = 1000  # depth, as ROS has it for parameter events
+QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
 
 
 class RecorderNode(Shell):
     """Every topic of the table (or those named) -> recording, recorder/recorded."""
+
+    hears_everybody = True
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("recorder_node", [], arguments, [])
@@ -133,12 +136,17 @@ class RecorderNode(Shell):
         try:
             yield
         except WriteError as error:
-            self._failed = True
-            raise NodeError(f"recorder_node: {error}") from None
+            raise self._given_up(error) from None
+
+    def _given_up(self, error: WriteError) -> NodeError:
+        self._failed = True
+        return NodeError(f"recorder_node: {error}")
 
     def _write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        with self._watched():
+        try:
             self._writer.write(topic, data, log_time, publish_time)
+        except WriteError as error:
+            raise self._given_up(error) from None
 
     def _flush(self) -> None:
         with self._watched():
@@ -151,14 +159,15 @@ class RecorderNode(Shell):
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
         self._writer.add_topic(full_name, schema(topic.type), about)
 
-        def receive(data: bytes) -> None:
-            stamp = stamp_ns(data)
-            if self.lockstep:
-                self._on_stamp(topic, stamp, data)
-            else:
-                self._write(full_name, data, self.get_clock().now().nanoseconds, stamp)
+        def receive_by_stamp(data: bytes) -> None:
+            self._on_stamp(topic, stamp_ns(data), data)
 
-        self.hear(topic, receive, profile)
+        def receive_by_clock(data: bytes) -> None:
+            self.heard += 1
+            self._write(full_name, data, self.now_ns(), stamp_ns(data))
+
+        profile.depth = QUEUE
+        self.hear(topic, receive_by_stamp if self.lockstep else receive_by_clock, profile)
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data
@@ -171,7 +180,7 @@ class RecorderNode(Shell):
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
-                self._report(self._next)
+                self._ack.publish(header_message(self._next))
             self._next += PLANT_PERIOD_NS
 
     def _is_complete(self, stamp: int) -> bool:
@@ -226,17 +235,12 @@ class RecorderNode(Shell):
         """Store what was set at a node while it runs, with the recording's own time."""
         if self._nodes and event.node not in self._nodes:
             return
-        time = self._next if self.lockstep else self.get_clock().now().nanoseconds
+        time = self._next if self.lockstep else self.now_ns()
         for parameter in event.changed_parameters:
             value = parameter_value_to_python(parameter.value)
             change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
             self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
             self.changes += 1
-
-    def _report(self, stamp: int) -> None:
-        message: Any = Header()
-        message.stamp.sec, message.stamp.nanosec = divmod(stamp, conversions.NANOSECONDS)
-        self._ack.publish(message)
 
 
 def _known(name: str, table: tuple[Topic, ...]) -> Topic:

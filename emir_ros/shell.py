@@ -60,6 +60,9 @@ class Shell(LifecycleNode):
     ParameterError for a model that the node does not know.
     """
 
+    hears_everybody = False  # and shall take what has arrived before it ends
+    heard = 0  # messages so far, of such a node
+
     def __init__(
         self,
         name: str,
@@ -118,7 +121,7 @@ class Shell(LifecycleNode):
 
         def take(data: bytes) -> None:
             if self.active:
-                receive(data)
+                self._keep_failure(receive, data)
 
         def late(_: Any) -> None:
             self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
@@ -132,7 +135,7 @@ class Shell(LifecycleNode):
                 self.diagnostics.counts[f"{topic.name}: publisher lost"] += 1
 
         events = SubscriptionEventCallbacks(deadline=late, liveliness=alive, matched=matched)
-        return self.create_subscription(
+        return super().create_subscription(
             conversions.message_class(topic.type),
             topic.name,
             take,
@@ -200,8 +203,16 @@ class Shell(LifecycleNode):
         return time.monotonic()
 
     def now_ns(self) -> int:
-        """Return the time of the node's clock, in lock step the stamp of its latest step, ns."""
-        return max(self.last_stamp, 0) if self.lockstep else self.get_clock().now().nanoseconds
+        """Return the time of the node's clock, in lock step the stamp of its latest step, ns.
+
+        The computer's own time is asked directly: rclpy makes objects of it, which takes longer
+        than all else that is done with a message.
+        """
+        if self.lockstep:
+            return max(self.last_stamp, 0)
+        if self.get_parameter("use_sim_time").value:
+            return int(self.get_clock().now().nanoseconds)
+        return time.time_ns()
 
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
@@ -326,12 +337,15 @@ class ControlNode(Shell):
         self._inputs[topic.name] = topic
         wire = Wire(topic)
 
-        def receive(data: bytes) -> None:
-            if not self.lockstep:
-                self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
-            elif stamp_ns(data) % self._period == 0:
-                self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
+        def receive_latest(data: bytes) -> None:
+            self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
 
+        def receive_all(data: bytes) -> None:
+            stamp = stamp_ns(data)
+            if stamp % self._period == 0:
+                self._on_stamp(topic, stamp + later, wire.decode(data))
+
+        receive = receive_all if self.lockstep else receive_latest
         self.hear(topic, receive, qos.requested(topic, lockstep=self.lockstep))
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:

@@ -12,6 +12,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir
 
 from rosbags.highlevel import AnyReader
 
+from emir_analysis.cli import main as analyze
 from emir_analysis.info import info
 from emir_analysis.replay import replay
 from emir_analysis.robot_controls import (
@@ -48,6 +49,9 @@ def test_lockstep_graph_equals_the_plain_loop(
     assert run_graph([*words, "--bag", str(bag)]) == 0
     assert "tcp_path_error_peak" in capfd.readouterr().out
     assert info(bag).about["model"] == "robot"
+    picture = tmp_path / "way.png"
+    assert analyze(["analyze", str(bag), "--picture", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
     sheet = robot()
     planned = trajectory(sheet, "line", TrajectoryParameters(), path_parameters(sheet))
     loop = RobotLoop(
@@ -137,7 +141,7 @@ BAD = {
     "joint 1's parameter": (
         [],
         "plant_node: {ros__parameters: {initial_angle: 0.5}}",
-        "plant_node: initial_angle: there is no such parameter",
+        "plant_node: initial_angle: there is no such parameter; there are .*initial_angles, ",
     ),
     "effect": (
         [],

@@ -115,14 +115,6 @@ class Selector:
         if times != sorted(set(times)) or times[:1] != [0.0]:
             raise ParameterError(f"times of switching {times}: have to rise from 0 s")
 
-    def step(
-        self, state: tuple[int, str] | None, signals: Signals, dt: float
-    ) -> tuple[tuple[int, str], Signals]:
-        """Return the number of periods and who drives, and the command of that one."""
-        ticks, driving = state or (0, self.due(0, dt))
-        driving = self.driver(driving, self.due(ticks, dt), signals)
-        return (ticks + 1, driving), self.selected(driving, signals)
-
     @staticmethod
     def driver(driving: str, wanted: str, signals: Signals) -> str:
         """Return who drives: the one that is wanted, as soon as it is ready."""
@@ -141,6 +133,41 @@ class Selector:
         return {"velocity_command": command, "applied_command": command} | active
 
 
+class Chosen(NamedTuple):
+    """How many periods have passed, who is to drive, and whose command is handed on."""
+
+    ticks: int
+    name: str
+    drives: str
+
+
+@dataclass(frozen=True)
+class Choosing:
+    """selector_node as it runs: by the switches, or by who was chosen last. first: who begins."""
+
+    outputs: ClassVar[Topics] = Selector.outputs
+    selector: Selector
+    first: str
+
+    @property
+    def inputs(self) -> Topics:
+        """Return the commands of the controllers that are there."""
+        return tuple(OFFERED_COMMANDS[name] for name in self.selector.controllers)
+
+    def step(self, state: Chosen | None, signals: Signals, dt: float) -> tuple[Chosen, Signals]:
+        """Return the next state and the chosen controller's command; state None: begin here."""
+        ticks, name, drives = state or Chosen(0, self.first, self.first)
+        due = self.selector.due(ticks, dt)
+        if ticks and due != self.selector.due(ticks - 1, dt):
+            name = due
+        drives = self.selector.driver(drives, name, signals)
+        return Chosen(ticks + 1, name, drives), self.selector.selected(drives, signals)
+
+    def choose(self, state: Chosen | None, name: str) -> Chosen:
+        """Return the state in which that controller drives as soon as it is ready."""
+        return state._replace(name=name) if state else Chosen(0, name, name)
+
+
 @dataclass(frozen=True)
 class SwitchedLoop:
     """The same without ROS. controls: by name."""
@@ -150,8 +177,8 @@ class SwitchedLoop:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
-        selector = Selector(tuple(self.controls), self.switches)
-        begin: tuple[dict[str, Any], tuple[int, str] | None, Signals] = ({}, None, {})
+        selector = Choosing(Selector(tuple(self.controls), self.switches), self.switches[0].name)
+        begin: tuple[dict[str, Any], Chosen | None, Signals] = ({}, None, {})
         states, driving, fed_back = state or begin
         known = signals | fed_back
         after: dict[str, ReadyState] = {}

@@ -50,6 +50,7 @@ class Machine(Protocol):
 
     command: Topic
     plant: Any
+    state: Any
     truth: Any
 
     def step(self, commands: Signals, dt: float) -> None:

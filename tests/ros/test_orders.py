@@ -22,6 +22,7 @@ from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
 from emir_analysis.run_signals import load_run
 from emir_analysis.stamped import same
+from emir_analysis.switching import Switch
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, ROBOT
 from emir_ros.graph import Plan, ros_arguments
 from emir_ros.main import make_executor
@@ -145,6 +146,20 @@ def test_orders_and_settings_replay_bit_for_bit(tmp_path: Path) -> None:
         assert same(replay(bag, node, {})), node
     unheard = _without(bag, tmp_path / "unheard", "/orders")
     assert not same(replay(unheard, "trajectory", {}))
+
+
+def test_a_switch_by_hand_replays_bit_for_bit(tmp_path: Path) -> None:
+    """Planned to pfc, by hand back to cascade: the selector and those whom it tells."""
+    plan = Plan(tmp_path / "run", duration=3.2, switches=(Switch(1.6, "pfc"),))
+    run = Run(plan)
+    run.at(2.2, run.set("selector_node", "controller", "cascade"))
+    bag = run.run()
+    (order,) = orders(bag, "selector_node")
+    for node in ("trajectory", "cascade", "pfc", "selector", "force_loop", "plant"):
+        assert same(replay(bag, node, {})), node
+    active = {f.name: f for f in replay(bag, "selector", {})}["cascade_active"].recorded
+    after = order.stamp // CONTROL_PERIOD_NS
+    assert active.tolist() == [1.0] * 50 + [0.0] * (after - 50) + [1.0] * (len(active) - after)
 
 
 def test_what_was_set_without_its_period_is_refused(

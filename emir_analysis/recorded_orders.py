@@ -25,6 +25,13 @@ class Order(NamedTuple):
     what: str
     values: dict[str, Any]
 
+    @property
+    def line(self) -> str:
+        """Return what it was and since when."""
+        set_ = ", ".join(f"{name} = {value}" for name, value in self.values.items())
+        detail = f" {set_}" if self.what == SET else ""
+        return f"from {self.stamp * 1e-9:.3f} s: {self.what}{detail}"
+
 
 def as_values(points: Waypoints) -> dict[str, Any]:
     """Return waypoints as JSON can hold them."""

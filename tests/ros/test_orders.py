@@ -1,5 +1,6 @@
 """What is ordered or set during a run in lock step is recorded with its period, and replayed."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -124,7 +125,9 @@ class Run:
             executor.add_node(plant)
 
 
-def test_orders_and_settings_replay_bit_for_bit(tmp_path: Path) -> None:
+def test_orders_and_settings_replay_bit_for_bit(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     run = Run(Plan(tmp_path / "run", duration=9.6))
     run.at(1.6, run.set("cascade_node", "gain", 1.0))
     run.at(1.8, run.set("force_loop_node", "gain", 5e-8))
@@ -144,6 +147,10 @@ def test_orders_and_settings_replay_bit_for_bit(tmp_path: Path) -> None:
     assert np.abs(recorded.value[recorded.time > 8.5]).max() > 0.02  # started anew
     for node in ("trajectory", "cascade", "force_loop", "plant"):
         assert same(replay(bag, node, {})), node
+    capfd.readouterr()
+    assert main(["replay", str(bag), "--node", "cascade"]) == 0
+    first = capfd.readouterr().out.splitlines()[0]
+    assert re.fullmatch(r"from 1\.\d+ s: set gain = 1\.0", first)
     unheard = _without(bag, tmp_path / "unheard", "/orders")
     assert not same(replay(unheard, "trajectory", {}))
 

@@ -88,7 +88,7 @@ class Run:
 
     def run(self) -> Path:
         """Run to the end; returns the recording."""
-        with ros_arguments(self._plan) as words, make_executor(fast=True) as executor:
+        with ros_arguments(self._plan) as words, make_executor() as executor:
             try:
                 for name in self._plan.nodes:
                     self.nodes[name] = _node_class(name)(words)

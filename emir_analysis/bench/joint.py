@@ -235,7 +235,7 @@ def _growth(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
         contenders.append(Contender("plain C without effects", by_c, task.duration))
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
     for threads in dict.fromkeys((1, most)):
-        for number in (1, 2, 4, 6, 8, 16):
+        for number in (1, 2, 4, 6, 8, 16, 32):
             starts = np.tile(task.start, (number, 1))
             machines = np.tile(task.plant.record, number)
             name = f"{number} on {threads} core{'s' if threads > 1 else ''}"

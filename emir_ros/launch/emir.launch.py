@@ -40,7 +40,7 @@ def generate_launch_description() -> LaunchDescription:
             _argument("controller", "cascade", "cascade, pfc, pfc_tip, lqg, mpc"),
             _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
-            _argument("model", "joint1", "joint1, or robot: the whole robot, with cascade"),
+            _argument("model", "joint1", "joint1, or robot: the whole robot, cascade or pfc"),
             _argument("params", parameters, "YAML file with the nodes' parameters"),
             _argument("transforms", "false", "frames on /tf, by robot_state_publisher"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),

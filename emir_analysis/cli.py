@@ -155,6 +155,7 @@ def _bag(words: list[str]) -> int:
 def _replay(words: list[str]) -> int:
     import yaml
 
+    from emir_analysis.recorded_orders import orders
     from emir_analysis.replay import NODES, replay, text
     from emir_analysis.stamped import same
 
@@ -176,6 +177,8 @@ def _replay(words: list[str]) -> int:
         except yaml.YAMLError:
             raise InputError(f"--set {entry}: {value} is not a value") from None
     fields = replay(options.bag, options.node, changed)
+    for order in orders(options.bag, f"{options.node}_node"):
+        print(order.line)
     print(text(fields, changed))
     return 0 if changed or same(fields) else 1
 
@@ -194,6 +197,7 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the way of the robot's TCP")
     options = parser.parse_args(words)
     runs = [run_report.analyze(bag) for bag in options.bag]
     run_report.check_alike(runs)
@@ -202,6 +206,7 @@ def _analyze(words: list[str]) -> int:
         (options.json, run_report.write_json),
         (options.csv, run_report.write_csv),
         (options.html, run_report.write_report),
+        (options.picture, run_report.write_path),
     ):
         if file:
             write(runs, file)
@@ -229,7 +234,9 @@ def _compare(words: list[str]) -> int:
     parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
-    parser.add_argument("--trade-off", action="store_true", help="instead: cascade over k_p and T")
+    parser.add_argument(
+        "--trade-off", action="store_true", help="instead: cascade over k_p and T, others"
+    )
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
-from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop
+from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl, Stepping
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
@@ -33,20 +33,20 @@ REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 
 def controllers(
     joint_file: Path | None = None, tip_file: Path | None = None
-) -> dict[str, OuterLoop]:
+) -> dict[str, Stepping]:
     """Return what is compared, by name; None: the design that comes with the project."""
     joint = pfc_file.load(joint_file or pfc_file.default_file(STROKE), STROKE)
     tip = pfc_file.load(tip_file or pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)
-    loops: dict[str, OuterLoop] = {"cascade": CascadeLoop()}
+    loops: dict[str, Stepping] = {"cascade": CascadeControl()}
     futures: tuple[Future, ...] = ("preview", "velocity", "constant")
     for future in futures:
-        loops[f"pfc, {future}"] = PfcLoop(law_of(replace(joint, future=future)))
+        loops[f"pfc, {future}"] = PfcControl(law_of(replace(joint, future=future)))
     for future in futures:
-        loops[f"pfc_tip, {future}"] = PfcTipLoop(Tip(law_of(replace(tip, future=future))))
+        loops[f"pfc_tip, {future}"] = PfcTipControl(Tip(law_of(replace(tip, future=future))))
     following = {output: pfc_file.find(SCHEDULED, output) for output in (STROKE, TIP_ANGLE)}
     by_load = {output: law_of(pfc_file.load(file, output)) for output, file in following.items()}
-    loops[f"pfc, {SCHEDULED}"] = PfcLoop(by_load[STROKE])
-    loops[f"pfc_tip, {SCHEDULED}"] = PfcTipLoop(Tip(by_load[TIP_ANGLE]))
+    loops[f"pfc, {SCHEDULED}"] = PfcControl(by_load[STROKE])
+    loops[f"pfc_tip, {SCHEDULED}"] = PfcTipControl(Tip(by_load[TIP_ANGLE]))
     return loops
 
 
@@ -77,7 +77,7 @@ class MoveFigures:
 
 
 def repeated(
-    machine: Machine, trajectory: AwayAndBack, outer: OuterLoop, angle: float, count: int
+    machine: Machine, trajectory: AwayAndBack, outer: Stepping, angle: float, count: int
 ) -> Iterator[Run]:
     """Yield runs that differ as two runs of a machine do.
 
@@ -90,7 +90,7 @@ def repeated(
         yield run(other, trajectory, outer, angle + step * k / count)
 
 
-def run(machine: Machine, trajectory: AwayAndBack, outer: OuterLoop, angle: float) -> Run:
+def run(machine: Machine, trajectory: AwayAndBack, outer: Stepping, angle: float) -> Run:
     """Return the signals of a closed loop from rest at a boom angle, rad."""
     loop = ClosedLoop(Plant(machine), trajectory, outer)
     return loop.run(angle, REST_PRESSURE, trajectory.duration)

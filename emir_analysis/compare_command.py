@@ -12,7 +12,7 @@ from emir_analysis import compare_grid, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.errors import InputError
-from emir_analysis.outer_loop import OuterLoop
+from emir_analysis.node_controls import Stepping
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import cautions
@@ -29,7 +29,9 @@ def command(options: Namespace, progress: Progress) -> str:
             save(damping.picture(joint1()), options.picture)
         return damping.as_text(joint1())
     if options.trade_off:
-        curve = trade_off.curve(joint1(), progress)
+        others = select(_known(options), options.controllers)
+        others.pop("cascade", None)
+        curve = trade_off.curve(joint1(), others, progress)
         if options.picture:
             save(trade_off.picture(curve), options.picture)
         return trade_off.as_text(curve)
@@ -40,7 +42,7 @@ def command(options: Namespace, progress: Progress) -> str:
     return _one(chosen, cases[0], options, progress)
 
 
-def _known(options: Namespace) -> dict[str, OuterLoop]:
+def _known(options: Namespace) -> dict[str, Stepping]:
     """Return every controller, those of `emir yardstick` made for this machine."""
     known, machine = controllers(options.pfc, options.pfc_tip), joint1()
     as_it_is = replace(
@@ -64,7 +66,7 @@ def _cases(options: Namespace) -> list[Case]:
 
 
 def _grid(
-    chosen: dict[str, OuterLoop], cases: list[Case], options: Namespace, progress: Progress
+    chosen: dict[str, Stepping], cases: list[Case], options: Namespace, progress: Progress
 ) -> str:
     if options.repeat > 1:
         raise InputError("--repeat is for one case: a grid varies enough")
@@ -78,7 +80,7 @@ def _grid(
     return f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
 
 
-def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, OuterLoop]:
+def select(known: dict[str, Stepping], names: list[str] | None) -> dict[str, Stepping]:
     """Return the controllers of these names, or all; raises ParameterError for an unknown one."""
     for name in names or ():
         if name not in known:
@@ -86,7 +88,7 @@ def select(known: dict[str, OuterLoop], names: list[str] | None) -> dict[str, Ou
     return {name: known[name] for name in names or known}
 
 
-def _one(chosen: dict[str, OuterLoop], case: Case, options: Namespace, progress: Progress) -> str:
+def _one(chosen: dict[str, Stepping], case: Case, options: Namespace, progress: Progress) -> str:
     """Return the table of one case."""
     title = f"{case.angle:g} deg, {case.payload:g} kg"
     machine = case.machine(joint1())

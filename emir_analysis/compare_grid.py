@@ -18,7 +18,7 @@ from emir_analysis.compare import MoveFigures, direction, figures, moves, run
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.errors import InputError
 from emir_analysis.margin import gain_margin, linear_machine
-from emir_analysis.outer_loop import OuterLoop
+from emir_analysis.node_controls import Stepping
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import declared, with_values
 from emir_control.trajectory import TrajectoryParameters, named
@@ -79,7 +79,7 @@ class Result:
 
 def results(
     base: Machine,
-    controllers: Mapping[str, OuterLoop],
+    controllers: Mapping[str, Stepping],
     cases: Sequence[Case],
     progress: Callable[[str], None],
 ) -> list[Result]:
@@ -105,7 +105,7 @@ def results(
 
 
 def _of_case(
-    base: Machine, name: str, outer: OuterLoop, case: Case, margins: dict[str, float]
+    base: Machine, name: str, outer: Stepping, case: Case, margins: dict[str, float]
 ) -> Iterator[Result]:
     ramp = 0.75 * min(1.0, math.sqrt(case.size / 63.75))  # s: a short move is a quick one
     given = TrajectoryParameters(distance=case.size * 1e-3, ramp=ramp)
@@ -117,7 +117,7 @@ def _of_case(
         yield Result(name, case, way, found, margins[way])
 
 
-def _margins(case: Case, base: Machine, outer: OuterLoop) -> dict[str, float]:
+def _margins(case: Case, base: Machine, outer: Stepping) -> dict[str, float]:
     """Return the gain margin of each direction; nan where the machine has no such slow motion."""
     found = {}
     for way, velocity in (("lift", 0.01), ("lower", -0.01)):

@@ -15,7 +15,7 @@ from emir_analysis.compare import REST_PRESSURE, Run
 from emir_analysis.compare_command import save, select
 from emir_analysis.disturbance import LoadChange, push
 from emir_analysis.limit import PAPER_MOVE
-from emir_analysis.outer_loop import OuterLoop
+from emir_analysis.node_controls import Stepping
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import EVERYDAY, controllers
 from emir_common.parameter_tree import with_values
@@ -86,7 +86,7 @@ def command(words: Sequence[str], progress: Progress) -> str:
     return "\n".join(lines)
 
 
-def _disturbed(stated: Machine, case: Case, outer: OuterLoop, angle: float) -> tuple[Array, Array]:
+def _disturbed(stated: Machine, case: Case, outer: Stepping, angle: float) -> tuple[Array, Array]:
     """Return dynamic deflection and error of the TCP, m, (n,), in each plant period."""
     machine = with_values(stated, {"geometry.payload": case.payload})
     change = None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.design_pfc import PERIOD, OperatingPoint, steady_motion, velocity_model
-from emir_analysis.outer_loop import OuterLoop, Situation
+from emir_analysis.node_controls import Stepping, situation
 from emir_common.parameter_tree import with_values
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import PREVIEW
@@ -67,13 +67,13 @@ def linear_machine(machine: Machine, point: OperatingPoint) -> LinearMachine:
     return LinearMachine(model, np.pad(outputs, ((0, 0), (0, behind))), plant.outputs(state))
 
 
-def gain_margin(linear: LinearMachine, outer: OuterLoop) -> float:
+def gain_margin(linear: LinearMachine, outer: Stepping) -> float:
     """Return the factor on the machine's gain from which on a push does not die out any more.
 
     Below 1 the loop is unstable; 1/WIDEST and WIDEST stand for beyond that. Not a number for a
     controller that commands the valve itself, without the force loop.
     """
-    begin = Situation(
+    begin = situation(
         Reference(linear.at.stroke, 0.0),
         (linear.at.stroke,) * PREVIEW,
         linear.measured(np.zeros(linear.model.order)),
@@ -92,7 +92,7 @@ def gain_margin(linear: LinearMachine, outer: OuterLoop) -> float:
     return math.exp(0.5 * (low + high))
 
 
-def dies_out(linear: LinearMachine, outer: OuterLoop, factor: float) -> bool:
+def dies_out(linear: LinearMachine, outer: Stepping, factor: float) -> bool:
     """Return whether the loop comes to rest again after a push, with that factor on the gain."""
     at, x, state = linear.at, np.zeros(linear.model.order), None
     moved = np.empty(WATCHED)
@@ -101,7 +101,7 @@ def dies_out(linear: LinearMachine, outer: OuterLoop, factor: float) -> bool:
         moved[k] = linear.model.C @ x
         if abs(moved[k]) > GROWN:  # on its way to where the command's limits hold it
             return False
-        now = Situation(reference, preview, linear.measured(x))
+        now = situation(reference, preview, linear.measured(x))
         signals: dict[str, Any]
         state, signals = outer.step(state, now, PERIOD)
         push = PUSH if k < PUSHED else 0.0

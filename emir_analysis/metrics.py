@@ -17,6 +17,8 @@ from emir_msgs_py.topics import CONTROL_PERIOD_NS, CYLINDER_PREVIEW
 Array = NDArray[np.float64]
 
 LONGEST_LAG = 1.5  # s
+COARSE_LAG = 0.016  # s: half a period of the reference, over which the error changes smoothly
+FINE_LAG = 1e-3  # s
 PAPER_LAG = 0.4  # s, T of law (11)
 BOOM_LENGTH = 22.5  # m, paper 1
 MOVING = 1e-4  # m/s of reference speed
@@ -178,9 +180,14 @@ def _lag(run: Recording, followed_by: str, reference: str) -> float | None:
     if time.size < 2:  # noqa: PLR2004 (too short to compare)
         return None
     value = at(run, followed_by, time)
-    lags = np.arange(0.0, LONGEST_LAG, 1e-3)
-    errors = [np.sum((value - at(run, reference, time - lag)) ** 2) for lag in lags]
-    return float(lags[int(np.argmin(errors))])
+
+    def best(lags: Array) -> float:
+        errors = [np.sum((value - at(run, reference, time - lag)) ** 2) for lag in lags]
+        return float(lags[int(np.argmin(errors))])
+
+    near = best(np.arange(0.0, LONGEST_LAG, COARSE_LAG))
+    fine = np.arange(near - COARSE_LAG, near + COARSE_LAG, FINE_LAG)
+    return best(np.round(fine[fine >= -0.5 * FINE_LAG], 6))
 
 
 def _dynamic_deflection(run: Recording) -> Array | None:

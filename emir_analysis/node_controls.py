@@ -1,21 +1,29 @@
 """What each control node computes, by the signals of the topic table and without ROS.
 
-The nodes of the graph and the replay of a recording both hold these objects.
+The nodes of the graph, the closed loop without ROS and the replay of a recording hold these
+objects.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from emir_analysis.outer_loop import lqg_signals, pfc_signals
-from emir_control.cascade import Cascade, CascadeInputs
+from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
-from emir_control.lqg import Lqg, LqgInputs
-from emir_control.pfc import Pfc, PfcInputs
-from emir_control.prefilter import PrefilterParameters, joint_angle, piston_stroke
+from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
+from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
+from emir_control.prefilter import (
+    PrefilterParameters,
+    commanded_velocity,
+    joint_angle,
+    piston_stroke,
+)
 from emir_control.scheduled_pfc import ScheduledPfc
+from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
 from emir_control.trajectory import (
+    NO_MOVE,
     AwayAndBack,
     Motion,
     Move,
@@ -40,9 +48,11 @@ from emir_msgs_py.topics import (
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
     VALVE_COMMAND,
+    VALVE_LOOPS,
     VELOCITY_COMMAND,
     Topic,
 )
+from emir_plant.sensors import Measurement
 
 Signals = dict[str, float]
 Topics = tuple[Topic, ...]
@@ -84,6 +94,23 @@ class Switchable(NodeControl, Protocol):
 
     def take_over(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the state whose next command is the one in force."""
+
+
+def situation(
+    reference: Reference, preview: Sequence[float], reading: Measurement, move: Move = NO_MOVE
+) -> Signals:
+    """Return what controllers are told in a period, by signal. preview: strokes to come, m."""
+    wanted = {"reference_stroke": reference.stroke, "reference_velocity": reference.velocity}
+    ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
+    return reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
+
+
+@runtime_checkable
+class TakesOverAtRest(NodeControl, Protocol):
+    """A controller that plans whole moves: it takes over between two of them."""
+
+    def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
+        """Return the next state while another drives, and what is offered. state None: begin."""
 
 
 class _Piston:
@@ -164,7 +191,7 @@ class CascadeControl:
 
     inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_STATES)
     outputs: ClassVar[Topics] = (CASCADE_TERMS, VELOCITY_COMMAND)
-    cascade: Cascade
+    cascade: Cascade = Cascade(CascadeParameters())
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
@@ -252,6 +279,22 @@ class PfcTipControl:
 
 
 @dataclass(frozen=True)
+class ShapedControl:
+    """Conventional control of a shaped reference; no node has it."""
+
+    inputs: ClassVar[Topics] = (CYLINDER_REFERENCE, CYLINDER_MOVE, CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (VELOCITY_COMMAND,)
+    shaped: ShapedCascade
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the command and its terms."""
+        measured = signals["stroke"], signals["force"]
+        inputs = ShapedInputs(_reference(signals), _move(signals), *measured)
+        state, outputs = self.shaped.step(state or self.shaped.initial(inputs), inputs, dt)
+        return state, outputs._asdict()
+
+
+@dataclass(frozen=True)
 class LqgControl:
     """lqg_node: LQG about a planned move, in the place of outer and force loop."""
 
@@ -265,16 +308,31 @@ class LqgControl:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
-        inputs = LqgInputs(
+        inputs = self._inputs(signals)
+        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
+        return state, _lqg_signals(self.name, outputs) | self._offered(outputs.valve_command)
+
+    def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
+        """Return the next state while another drives, and what is offered. state None: begin."""
+        inputs = self._inputs(signals)
+        state, ready = self.lqg.stand_by(state or self.lqg.initial(inputs), inputs)
+        shut = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
+        return state, _lqg_signals(self.name, shut) | self._offered(0.0, ready=ready)
+
+    def _offered(self, command: float, *, ready: bool = True) -> Signals:
+        """Return the command as the velocity that the prefilter turns into it."""
+        velocity = commanded_velocity(command, self.lqg.parameters.actuator.static)
+        return {f"{self.name}_command": velocity, f"{self.name}_ready": float(ready)}
+
+    def _inputs(self, signals: Signals) -> LqgInputs:
+        return LqgInputs(
             signals["reference_stroke"],
-            Move(*(signals[name] for name in CYLINDER_MOVE.fields)),
+            _move(signals),
             signals["angle"],
             signals["pressure_lifting"],
             signals["pressure_lowering"],
             signals["deflection"],
         )
-        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, lqg_signals(self.name, outputs)
 
 
 @dataclass(frozen=True)
@@ -303,6 +361,7 @@ class ForceLoopControl:
             signals["angle"],
             signals["pressure_lifting"],
             signals["pressure_lowering"],
+            direct=any(signals.get(f"{name}_active") == 1.0 for name in VALVE_LOOPS),
         )
         state, outputs = self.force_loop.step(state or self.force_loop.initial(inputs), inputs, dt)
         return state, force_loop_signals(outputs)
@@ -325,3 +384,22 @@ def _reference(signals: Signals) -> Reference:
 
 def _preview(signals: Signals) -> list[float]:
     return [signals[name] for name in CYLINDER_PREVIEW.fields]
+
+
+def _move(signals: Signals) -> Move:
+    return Move(*(signals[name] for name in CYLINDER_MOVE.fields))
+
+
+def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
+    terms = outputs._asdict()
+    command = terms.pop("valve_command")
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"valve_command": command} | named
+
+
+def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
+    """Return a predictive law's outputs by signal; terms of the law have the prefix."""
+    terms = outputs._asdict()
+    command = terms.pop("velocity_command")
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"velocity_command": command} | named

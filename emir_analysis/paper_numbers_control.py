@@ -12,7 +12,7 @@ from emir_analysis.compare import MoveFigures, Run, controllers, dynamic_deflect
 from emir_analysis.damping import LITRES_PER_MINUTE, UNDAMPED, damping_figures
 from emir_analysis.design_pfc import ORDERS, OperatingPoint, velocity_model
 from emir_analysis.limit import PAPER_MOVE, Move
-from emir_analysis.outer_loop import CascadeLoop
+from emir_analysis.node_controls import CascadeControl
 from emir_analysis.paper_number import Number, is_about, judged
 from emir_control import design, pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
@@ -193,7 +193,7 @@ def _capillary_line(machine: Machine) -> Number:
 def _trade_off(machine: Machine, move: AwayAndBack) -> Number:
     said, curve = [], []
     for gain, lag in TUNINGS:
-        loop = CascadeLoop(Cascade(CascadeParameters(gain=gain, time_constant=lag)))
+        loop = CascadeControl(Cascade(CascadeParameters(gain=gain, time_constant=lag)))
         moves = figures(run(machine, move, loop, FORTY_FIVE))
         error, bent = max(m.error for m in moves), _bent(moves)
         curve.append((error, bent))

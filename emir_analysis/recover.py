@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Metadata, Schema
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
@@ -48,7 +48,7 @@ def _copy(file: Path, writer: Rosbag2Writer) -> None:
         elif isinstance(record, Channel):
             if record.id not in topics:  # the index at the end names them again
                 topics[record.id] = _announced(file, record, schemas, writer)
-        elif isinstance(record, Message):
+        elif isinstance(record, bags.Raw):
             if record.channel_id not in topics:
                 raise InputError(f"{file}: damaged: a message of no known topic")
             topic = topics[record.channel_id]

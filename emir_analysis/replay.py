@@ -1,13 +1,13 @@
 """A recording's inputs fed to one of its nodes, the answers compared with the recorded ones.
 
-Open loop: what was recorded is fed whatever the controller answers.
+Open loop: what was recorded is fed whatever the controller answers. What the node was ordered or
+had set during the run comes at its recorded period.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
@@ -23,11 +23,14 @@ from emir_analysis.node_controls import (
     Stepping,
     TrajectoryControl,
 )
+from emir_analysis.parameter_files import unpacked
+from emir_analysis.recorded_orders import Obedience, orders
+from emir_analysis.recorded_parameters import Values, recorded_parameters
 from emir_analysis.replay_plant import replay_plant
 from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
-from emir_analysis.switching import Ready
+from emir_analysis.switching import Choosing, Ready, Selector, Switch
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -43,17 +46,17 @@ from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
+    OUTER_LOOPS,
     SELECTOR_TERMS,
+    VALVE_COMMAND,
     VELOCITY_COMMAND,
 )
 from emir_plant.sheet import joint1
 
-Values = dict[str, Any]
-
 PLANT = "plant"
-NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "force_loop", PLANT)
-# parameters of nodes, not controllers
-OF_EVERY_NODE = ("lockstep", "model", "input_timeout", "standby", "autostart")
+NODES = (
+    "trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "selector", "force_loop", PLANT,
+)  # fmt: skip
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -65,26 +68,42 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
-    about = bags.metadata(bag).get("emir", {})
-    if full_name(TCP_POSE, bags.recorded_topics(bag)):
-        return replay_robot(bag, node, {**_recorded_parameters(bag, node, about), **changed})
+    name = f"{node}_node"
+    kind = replay_robot if full_name(TCP_POSE, bags.recorded_topics(bag)) else _replay_joint1
+    with unpacked(bag, name, recorded_parameters(bag, name)) as values:
+        return kind(bag, node, values, changed)
+
+
+def _replay_joint1(
+    bag: Path, node: str, values: Values, changed: Mapping[str, Any]
+) -> list[FieldComparison]:
     if node == PLANT:
-        return replay_plant(bag, changed)
-    control = _control(node, {**_recorded_parameters(bag, node, about), **changed})
-    law: Stepping = control
+        return replay_plant(bag, values, changed)
+    control = _control(node, {**values, **changed})
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
     there, answers = bags.recorded_topics(bag), control.outputs
     offered = OFFERED_COMMANDS.get(node)
-    if offered and full_name(offered, there):  # one of several: it heard what was applied
-        law = Ready(node, control)
+    standby = offered is not None and full_name(offered, there) is not None
+
+    def law_of_node(given: Values) -> Stepping:
+        made = _control(node, given)
+        return Ready(node, made) if standby else made
+
+    if offered and standby:  # one of several: it heard what was applied
         for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
             inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
-        answers = tuple(offered if topic is VELOCITY_COMMAND else topic for topic in answers)
+        commands = VELOCITY_COMMAND, VALVE_COMMAND
+        answers = tuple(offered if topic in commands else topic for topic in answers)
+    elif node == "force_loop" and full_name(SELECTOR_TERMS, there):
+        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
+            inputs.get(stamp, {}).update(applied)
     kept = tuple(topic for topic in answers if full_name(topic, there))
     outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
-    state, rows = None, []
+    obedient = Obedience(law_of_node, values, changed, orders(bag, f"{node}_node"))
+    state, rows, dt = None, [], CONTROL_PERIOD_NS * 1e-9
     for stamp, signals in sorted(inputs.items()):
-        state, answer = law.step(state, signals, CONTROL_PERIOD_NS * 1e-9)
+        state = obedient.obey(stamp, state, dt)
+        state, answer = obedient.control.step(state, signals, dt)
         if stamp in outputs:
             rows.append((outputs[stamp], answer))
     if not rows:
@@ -109,21 +128,9 @@ def _line(field: FieldComparison) -> str:
     return f"{field.equal:>6} of {field.recorded.size} equal, {difference}"
 
 
-def _recorded_parameters(bag: Path, node: str, about: Mapping[str, str]) -> Values:
-    """Return what the run set for the node's controller, by dotted name."""
-    try:
-        nodes = json.loads(about.get("parameters", "{}"))
-        values = {**nodes.get("/**", {}), **nodes.get(f"{node}_node", {})}
-        if node == "trajectory" and "trajectory" in about:  # of the command line, which prevails
-            values["trajectory"] = about["trajectory"]
-    except (ValueError, AttributeError, TypeError):
-        raise InputError(f"{bag}: metadata: parameters: not JSON of nodes") from None
-    return {name: value for name, value in values.items() if name not in OF_EVERY_NODE}
-
-
 def _control(node: str, values: Values) -> NodeControl:
     try:
-        return _CONTROLS[node](values)
+        return _CONTROLS[node](dict(values))
     except ParameterError as error:
         raise ParameterError(f"{node}: {error}") from None
 
@@ -157,9 +164,22 @@ def _trajectory(values: Values) -> NodeControl:
     return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
 
 
+def _selector(values: Values) -> NodeControl:
+    names = values.pop("controllers", list(OUTER_LOOPS))
+    times, switched = values.pop("switch_times", [0.0]), values.pop("switch_to", names[:1])
+    first = values.pop("controller", switched[0])
+    for name in values:
+        raise ParameterError(f"{name}: there is no such parameter")
+    if len(times) != len(switched):
+        raise ParameterError("switch_times and switch_to differ in length")
+    switches = [Switch(*pair) for pair in zip(times, switched, strict=True)]
+    # cast: its inputs are those of the controllers that run
+    return cast("NodeControl", Choosing(Selector(names, switches), first))
+
+
 _CONTROLS = {
     "trajectory": _trajectory, "cascade": _cascade, "pfc": _pfc, "pfc_tip": _pfc_tip,
-    "lqg": _lqg, "mpc": _mpc, "force_loop": _force_loop,
+    "lqg": _lqg, "mpc": _mpc, "selector": _selector, "force_loop": _force_loop,
 }  # fmt: skip
 
 

@@ -1,40 +1,42 @@
 """The machine replayed: recorded valve commands in, sensors and truth against the recorded ones."""
 
-import json
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from emir_analysis import bags
 from emir_analysis.errors import InputError
-from emir_analysis.info import PARAMETERS
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import PLANT_PERIOD_NS, TOPICS, TRUTH, VALVE_COMMAND
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
-from emir_plant.sheet import joint1
+from emir_plant.sheet import joint1, load_sheet
 
 NODE = "plant_node"
 OUTPUTS = tuple(topic for topic in TOPICS if topic.publisher == NODE)
 START = ("initial_angle", "initial_pressure_lowering")
+FILE = "machine_file"
 
 
-def replay_plant(bag: Path, changed: Mapping[str, Any]) -> list[FieldComparison]:
+def replay_plant(
+    bag: Path, recorded: Mapping[str, Any], changed: Mapping[str, Any]
+) -> list[FieldComparison]:
     """Simulate the recorded machine under the recorded valve commands.
 
-    changed: parameters by dotted name, over the recorded ones. Raises InputError for a recording
-    without the machine's parameters or topics or not in lock step, ParameterError for a parameter
-    that does not exist or is out of range.
+    recorded: parameters of the recorded plant node by dotted name, over which those that are
+    changed prevail. Raises InputError for a recording without the machine's parameters or topics or
+    not in lock step, ParameterError for a parameter that does not exist or is out of range.
     """
-    values = {**recorded_parameters(bag), **changed}
-    machine = joint1()
+    check_recorded(bag, recorded, START)
+    values = {**recorded, **changed}
+    machine = load_sheet(Path(values[FILE])).machine if values.get(FILE) else joint1()
     known = declared(machine)
     for name in changed:
-        if name not in known and name not in START:
+        if name not in known and name not in {*START, FILE}:
             raise ParameterError(f"plant: {name}: there is no such parameter")
     try:
         machine = with_values(machine, {k: v for k, v in values.items() if k in known})
@@ -45,19 +47,26 @@ def replay_plant(bag: Path, changed: Mapping[str, Any]) -> list[FieldComparison]
         stamp: signals["valve_command"]
         for stamp, signals in by_stamp(bag, (VALVE_COMMAND,), PLANT_PERIOD_NS).items()
     }
-    if 0 not in outputs or 0 not in commands:
-        raise InputError(f"{bag}: nothing at t = 0 s: not recorded in lock step?")
+    check_start(bag, outputs, commands)
     start = [float(values[name]) for name in START]
     return compared(OUTPUTS, _rows(Plant(machine), start, commands, outputs))
 
 
-def recorded_parameters(bag: Path) -> dict[str, Any]:
-    """Return the parameters of the recorded plant node. Raises InputError without them."""
-    about = bags.metadata(bag).get(PARAMETERS, {})
-    if NODE not in about:
+def check_recorded(bag: Path, values: Mapping[str, Any], needed: Collection[str]) -> None:
+    """Raise InputError where the recording does not say how the machine was set up."""
+    if not values.keys() >= set(needed):
         raise InputError(f"{bag}: holds no parameters of {NODE}: not recorded by emir run?")
-    values: dict[str, Any] = json.loads(about[NODE])
-    return values
+
+
+def check_start(bag: Path, outputs: Collection[int], commands: Collection[int]) -> None:
+    """Raise InputError where the recording, by its stamps, does not begin at the start."""
+    if 0 not in outputs or 0 not in commands:
+        raise InputError(f"{bag}: nothing at t = 0 s: not recorded in lock step?")
+
+
+def finite(command: float) -> float:
+    """Return the command that the machine obeys: what is not a number shuts the valve."""
+    return command if math.isfinite(command) else 0.0
 
 
 def _rows(
@@ -78,6 +87,6 @@ def _rows(
         reading = measure(plant, truth, tick, state)
         signals = reading._asdict() | dict(zip(TRUTH.fields, np.asarray(truth), strict=True))
         rows.append((outputs[stamp], {name: float(value) for name, value in signals.items()}))
-        command = commands.get(stamp, command)
+        command = finite(commands.get(stamp, command))
         state, truth = plant.step(state, command, PLANT_PERIOD_NS * 1e-9)
     return rows

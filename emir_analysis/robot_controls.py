@@ -11,10 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals, Topics
+from emir_analysis.node_controls import Signals, Topics, pfc_signals
 from emir_analysis.robot_setup import RobotForceLoopParameters
 from emir_control.cascade import Cascade, CascadeInputs
-from emir_control.force_loop import ForceLoop, ForceLoopInputs
+from emir_control.drive_loop import DriveLoop, DriveLoopInputs
+from emir_control.pfc import PREVIEW, Pfc, PfcInputs
 from emir_control.robot_trajectory import RobotTrajectory, RobotTrajectoryInputs
 from emir_control.trajectory import Reference
 from emir_control.waypoints import Waypoints
@@ -22,33 +23,48 @@ from emir_msgs_py.robot_topics import (
     JOINTS,
     PRESSURES,
     ROBOT_CASCADE_TERMS,
+    ROBOT_CYLINDER_PREVIEW,
     ROBOT_CYLINDER_REFERENCE,
     ROBOT_CYLINDER_STATES,
     ROBOT_FORCE_LOOP_TERMS,
     ROBOT_JOINT_STATES,
+    ROBOT_PFC_TERMS,
     ROBOT_VALVE_COMMAND,
     ROBOT_VELOCITY_COMMAND,
     TCP_REFERENCE,
     of_joints,
 )
+from emir_msgs_py.topics import CYLINDER_PREVIEW
 
 Array = NDArray[np.float64]
+
+MOTOR = JOINTS[0]
 
 
 @dataclass(frozen=True)
 class RobotTrajectoryControl:
     """trajectory_node: the desired motion of all pistons, and of the TCP."""
 
-    inputs: ClassVar[Topics] = (ROBOT_JOINT_STATES,)
-    outputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, TCP_REFERENCE)
+    inputs: ClassVar[Topics] = (ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES)
+    outputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, TCP_REFERENCE)
     trajectory: RobotTrajectory
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the reference of this period."""
-        inputs = RobotTrajectoryInputs(_six(signals, "angle"))
-        state, now = self.trajectory.step(state or self.trajectory.initial(inputs), inputs, dt)
-        outputs = _signals("reference_stroke", now.strokes)
+        angles, forces = _six(signals, "angle"), _six(signals, "force")
+        inputs = RobotTrajectoryInputs(angles, forces)
+        if (
+            state is None and not np.isfinite([angles, forces]).all()
+        ):  # begins with the first numbers
+            return None, {name: math.nan for topic in self.outputs for name in topic.fields}
+        state = state or self.trajectory.initial(inputs)
+        ahead = self.trajectory.ahead(state, PREVIEW, dt)
+        state, now = self.trajectory.step(state, inputs, dt)
+        preview = map(float, ahead.T.ravel())
+        outputs = dict(zip(ROBOT_CYLINDER_PREVIEW.fields, preview, strict=True))
+        outputs |= _signals("reference_stroke", now.strokes)
         outputs |= _signals("reference_velocity", now.velocities)
+        outputs |= _signals("reference_force", now.forces)
         yaw = math.atan2(now.place[1], now.place[0])
         outputs |= pose_signals("tcp_reference", now.place[:3], _quaternion(yaw, now.place[3]))
         return state, outputs
@@ -82,6 +98,33 @@ class RobotCascadeControl:
             own = state[joint] if state else self.cascade.initial(inputs)
             after[joint], shown = self.cascade.step(own, inputs, dt)
             outputs |= {f"{joint}_{name}": value for name, value in shown._asdict().items()}
+            outputs[f"{joint}_expected_force"] = signals[f"{joint}_reference_force"]
+        return after, outputs
+
+
+@dataclass(frozen=True)
+class RobotPfcControl:
+    """pfc_node: law (12) for every joint, with the same model and tuning."""
+
+    inputs: ClassVar[Topics] = (
+        ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, ROBOT_CYLINDER_STATES,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (ROBOT_PFC_TERMS, ROBOT_VELOCITY_COMMAND)
+    pfc: Pfc
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the commands and their terms."""
+        after: dict[str, Any] = {}
+        outputs: Signals = {}
+        for joint in JOINTS:
+            wanted = signals[f"{joint}_reference_stroke"], signals[f"{joint}_reference_velocity"]
+            preview = [signals[f"{joint}_{name}"] for name in CYLINDER_PREVIEW.fields]
+            inputs = PfcInputs(*wanted, preview, signals[f"{joint}_stroke"])
+            own = state[joint] if state else self.pfc.initial(inputs)
+            after[joint], shown = self.pfc.step(own, inputs, dt)
+            terms = pfc_signals("pfc", shown)
+            outputs |= {f"{joint}_{name}": value for name, value in terms.items()}
+            outputs[f"{joint}_expected_force"] = signals[f"{joint}_reference_force"]
         return after, outputs
 
 
@@ -98,14 +141,13 @@ class RobotForceLoopControl:
         after: dict[str, Any] = {}
         outputs: Signals = {}
         for joint in JOINTS:
-            loop = ForceLoop(getattr(self.parameters, joint))
-            inputs = ForceLoopInputs(
+            loop = DriveLoop(getattr(self.parameters, joint))
+            inputs = DriveLoopInputs(
                 signals[f"{joint}_velocity_command"],
-                0.0,
-                0.0,
+                signals[f"{joint}_expected_force"],
+                signals[f"{joint}_stroke"] if joint != MOTOR else 0.0,  # its chambers do not change
                 signals[f"{joint}_pressure_lifting"],
                 signals[f"{joint}_pressure_lowering"],
-                signals[f"{joint}_stroke"],
             )
             own = state[joint] if state else loop.initial(inputs)
             after[joint], shown = loop.step(own, inputs, dt)

@@ -38,7 +38,7 @@ def _joint_metrics(run: Recording, joint: str) -> list[Metric]:
 
 def _robot_metrics(run: Recording) -> list[Metric]:
     bent, turned = np.linalg.norm(deflection(run), axis=0), np.linalg.norm(rotation(run), axis=0)
-    path, end, tilted = path_error(run), end_error(run), end_tilt(run)
+    path, end, turned_off = path_error(run), end_error(run), tilt(run)
     figures: list[tuple[str, float, str, str]] = [
         ("tcp_deflection_start", float(bent[0]), "m", "TCP off the rigid robot, at the start."),
         ("tcp_deflection_peak", float(bent.max()), "m", "The same, largest."),
@@ -48,7 +48,9 @@ def _robot_metrics(run: Recording) -> list[Metric]:
         ("tcp_path_error_peak", float(path.max()), "m", "The same, largest."),
         ("tcp_error_peak", float(tcp_error(run).max()), "m", "TCP off its reference, with lag."),
         ("tcp_error_end", end, "m", "The same, mean of the last second."),
-        ("tcp_tilt_end", tilted, "rad", "Orientation of the TCP against its reference, likewise."),
+        ("tcp_tilt_end", float(np.mean(turned_off[_last(run)])), "rad",
+         "Orientation of the TCP against its reference, likewise."),
+        ("tcp_tilt_peak", float(turned_off.max()), "rad", "The same, largest."),
     ]  # fmt: skip
     found = [Metric(*figure) for figure in figures]
     if "supply_pressure" in run.signals:
@@ -91,7 +93,7 @@ def reference(run: Recording) -> Array:
 
 def tcp_error(run: Recording) -> Array:
     """Return the TCP's distance from its reference, (n,), m, at the times of the latter."""
-    return np.asarray(np.linalg.norm(_tcp(run) - reference(run), axis=1))
+    return np.asarray(np.linalg.norm(tcp(run) - reference(run), axis=1))
 
 
 def path_error(run: Recording) -> Array:
@@ -99,23 +101,23 @@ def path_error(run: Recording) -> Array:
     points = reference(run)
     fine = np.linspace(0.0, len(points) - 1.0, DENSER * len(points))
     between = [np.interp(fine, np.arange(len(points)), column) for column in points.T]
-    distance, _ = cKDTree(np.stack(between, axis=1)).query(_tcp(run))
+    distance, _ = cKDTree(np.stack(between, axis=1)).query(tcp(run))
     return np.asarray(distance)
 
 
 def end_error(run: Recording) -> float:
     """Return the distance of the TCP's mean place from its reference in the last second, m."""
     last = _last(run)
-    return float(np.linalg.norm((_tcp(run) - reference(run))[last].mean(axis=0)))
+    return float(np.linalg.norm((tcp(run) - reference(run))[last].mean(axis=0)))
 
 
-def end_tilt(run: Recording) -> float:
-    """Return the mean angle between the TCP's orientation and its reference then, rad."""
-    times, last = _times(run), _last(run)
+def tilt(run: Recording) -> Array:
+    """Return the angle between the TCP's orientation and its reference, (n,), rad."""
+    times = _times(run)
     measured = np.stack([at(run, f"tcp_q{axis}", times) for axis in "xyzw"], axis=1)
     wanted = np.stack([run[f"tcp_reference_q{axis}"].value for axis in "xyzw"], axis=1)
     cosine = np.abs(np.sum(measured * wanted, axis=1)) / np.linalg.norm(measured, axis=1)
-    return float(np.mean(2.0 * np.arccos(np.clip(cosine, 0.0, 1.0))[last]))
+    return np.asarray(2.0 * np.arccos(np.clip(cosine, 0.0, 1.0)))
 
 
 def _last(run: Recording) -> NDArray[np.bool_]:
@@ -127,6 +129,6 @@ def _times(run: Recording) -> Array:
     return run["tcp_reference_x"].time
 
 
-def _tcp(run: Recording) -> Array:
+def tcp(run: Recording) -> Array:
     """Return where the TCP is at the times of its reference, (n, 3), m."""
     return np.stack([at(run, f"tcp_{axis}", _times(run)) for axis in "xyz"], axis=1)

@@ -6,51 +6,72 @@ from typing import Any
 
 from emir_analysis.errors import InputError
 from emir_analysis.node_controls import NodeControl, Signals
+from emir_analysis.recorded_orders import Obedience, orders
 from emir_analysis.robot_controls import (
     RobotCascadeControl,
     RobotForceLoopControl,
+    RobotPfcControl,
     RobotTrajectoryControl,
 )
 from emir_analysis.robot_setup import (
     cascade_parameters,
     force_loops,
     path_parameters,
+    pfc_parameters,
     trajectory,
 )
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_control.cascade import Cascade
+from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
+from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-NODES = ("trajectory", "cascade", "force_loop")
+NODES = ("trajectory", "cascade", "pfc", "force_loop")
+PLANT = "plant"
 FILES = ("robot_file", "machine_file")
 
 
-def replay_robot(bag: Path, node: str, values: Mapping[str, Any]) -> list[FieldComparison]:
-    """Feed a lock-step recording to one of the robot's control nodes and compare the outputs.
+def replay_robot(
+    bag: Path, node: str, values: Mapping[str, Any], changed: Mapping[str, Any]
+) -> list[FieldComparison]:
+    """Feed a lock-step recording to one of the robot's nodes and compare the outputs.
 
-    values: the node's parameters by dotted name. Raises InputError for another node or a
-    recording not in lock step, ParameterError for a bad parameter.
+    values: the node's parameters by dotted name, over which those that are changed prevail. Raises
+    InputError for another node or a recording not in lock step, ParameterError for a bad parameter.
     """
+    if node == PLANT:
+        require_pinocchio()
+        from emir_analysis.robot_replay_plant import replay_robot_plant  # noqa: PLC0415
+
+        return replay_robot_plant(bag, values, changed)
     if node not in NODES:
-        raise InputError(f"--node {node}: of the whole robot there are {', '.join(NODES)}")
-    try:
-        control = _control(node, dict(values))
-    except ParameterError as error:
-        raise ParameterError(f"{node}: {error}") from None
+        raise InputError(
+            f"--node {node}: of the whole robot there are {', '.join((*NODES, PLANT))}"
+        )
+
+    def made(given: Mapping[str, Any]) -> NodeControl:
+        try:
+            return _control(node, dict(given))
+        except ParameterError as error:
+            raise ParameterError(f"{node}: {error}") from None
+
+    control = made({**values, **changed})
     fast = control.outputs[0].every == "plant"
     period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
     slow = _recorded(bag, [t for t in control.inputs if t.every == "control"], CONTROL_PERIOD_NS)
     quick = _recorded(bag, [t for t in control.inputs if t.every == "plant"], period)
     outputs = by_stamp(bag, control.outputs, period)
+    obedient = Obedience(made, values, changed, orders(bag, f"{node}_node"))
     state, rows = None, []
     held: Signals = {}
     for stamp, signals in sorted(quick.items()):
         held |= slow.get(stamp, {}) | signals
-        state, answer = control.step(state, held, period * 1e-9)
+        state = obedient.obey(stamp, state, period * 1e-9)
+        state, answer = obedient.control.step(state, held, period * 1e-9)
         if stamp in outputs:
             rows.append((outputs[stamp], answer))
     if not rows:
@@ -65,6 +86,8 @@ def _recorded(bag: Path, topics: list[Topic], period: int) -> dict[int, Signals]
 def _control(node: str, values: dict[str, Any]) -> NodeControl:
     if node == "cascade":
         return RobotCascadeControl(Cascade(with_values(cascade_parameters(), values)))
+    if node == "pfc":
+        return RobotPfcControl(Pfc(with_values(pfc_parameters(), values)))
     sheet = robot(*(Path(name) if name else None for name in (values.pop(f, "") for f in FILES)))
     if node == "force_loop":
         return RobotForceLoopControl(with_values(force_loops(sheet), values))

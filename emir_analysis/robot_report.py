@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.report import Block, Plot
+from emir_analysis.report import Block, Picture, Plot
 from emir_analysis.robot_metrics import joint_error, path_error, tcp_error
+from emir_analysis.robot_picture import path_picture
 from emir_analysis.run_plots import Line, Row, plot
 from emir_analysis.signals import Recording, Signal
 from emir_msgs_py.robot_topics import JOINTS
@@ -50,6 +51,7 @@ def robot_plots(runs: Mapping[str, Recording]) -> list[Block]:
     """Return the plots of runs by name."""
     derived = {name: with_errors(run) for name, run in runs.items()}
     return [
+        Picture(path_picture(runs), "The way of the TCP, and how far it is off."),
         Plot(plot(TCP, derived), "The TCP: error, deflection and turn by bending."),
         Plot(plot(ERRORS, derived), "How each joint follows."),
         Plot(plot(PRESSURES, derived), "Chamber pressures."),

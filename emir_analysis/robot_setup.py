@@ -10,15 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.machine_model import actuator
 from emir_common.quantity import check_ranges, quantity
+from emir_control.actuator import Actuator
 from emir_control.arm import JOINTS, Arm, ArmParameters
 from emir_control.cascade import CascadeParameters
-from emir_control.force_loop import ForceLoopParameters
+from emir_control.drive_loop import DriveLoopParameters
+from emir_control.internal_model import InternalModel
 from emir_control.inverse import Ranges
 from emir_control.limits import LimitParameters
-from emir_control.prefilter import PrefilterParameters
-from emir_control.robot_trajectory import LineParameters, Linkage, RobotTrajectory
+from emir_control.pfc import PfcParameters
+from emir_control.robot_trajectory import LineParameters, Linkage, RobotTrajectory, Supply
 from emir_control.trajectory import TrajectoryParameters
+from emir_msgs_py.topics import CONTROL_PERIOD_NS
 from emir_plant.parameters import Machine
 from emir_plant.robot import linkage
 from emir_plant.robot.actuators import machines
@@ -31,6 +35,9 @@ Array = NDArray[np.float64]
 # and high pass of 1 s the cascade would excite it. With these a single mode on the oil's spring
 # between 0.27 and 0.7 Hz keeps a damping of 0.2 of critical (docs/robot.md).
 GAIN = 0.7  # 1/s, k_p of law (11)
+LAG = 0.05  # s, T of law (11): command held for a period, force loop's period, spool, resolver
+RESPONSE = 3.0  # s, T_CLRT of (12): a gain of 0.74 1/s towards a set point 20 periods ahead
+PERIOD = CONTROL_PERIOD_NS * 1e-9  # s
 ENDLESS = (-5.0, 5.0)  # rad, the base
 HIGH_PASS = 3.0  # s, T_H of (10)
 DAMPING_RATE = 3.0  # 1/s, at which the force loop lets a cylinder's oil relax
@@ -60,12 +67,12 @@ class Posture:
 class RobotForceLoopParameters:
     """One force loop for each joint."""
 
-    base: ForceLoopParameters
-    joint1: ForceLoopParameters
-    joint2: ForceLoopParameters
-    joint3: ForceLoopParameters
-    joint4: ForceLoopParameters
-    joint5: ForceLoopParameters
+    base: DriveLoopParameters
+    joint1: DriveLoopParameters
+    joint2: DriveLoopParameters
+    joint3: DriveLoopParameters
+    joint4: DriveLoopParameters
+    joint5: DriveLoopParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +81,16 @@ class RobotPathParameters:
 
     arm: ArmParameters
     line: LineParameters = field(default_factory=LineParameters)
+    weigh: int = quantity(
+        "1", 0, 1, "1: the payload is read off the pistons' forces; 0: arm.payload", default=1
+    )
+    joint: int = quantity(
+        "1", 0, 5, "that lift-lower and lower-lift move, 0 the base: its m are rad", default=1
+    )
+    supply: float = quantity("Pa", 1e6, 5e7, "what the pump gives", default=2e7)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -105,7 +122,19 @@ class Motor:
 
 def cascade_parameters() -> CascadeParameters:
     """Return the parameters of law (11), for every joint: with one lag the TCP keeps its line."""
-    return CascadeParameters(gain=GAIN)
+    return CascadeParameters(gain=GAIN, time_constant=LAG)
+
+
+def pfc_parameters() -> PfcParameters:
+    """Return the parameters of law (12), for every joint.
+
+    Behind its force loop a piston moves with the command, late by a period. What the six do to
+    each other no model of one of them tells. So the model error is taken to stay as it is now (its
+    mean over 32 samples would come half a second late), and the response is the cascade's.
+    """
+    late = np.array([[1.0, PERIOD], [0.0, 0.0]])  # stroke, and the command that acts next
+    model = InternalModel(late, np.array([0.0, 1.0]), np.array([1.0, 0.0]), PERIOD)
+    return PfcParameters(model=model, response_time=RESPONSE, error_degree=0, error_window=1)
 
 
 def force_loops(robot: Robot) -> RobotForceLoopParameters:
@@ -123,21 +152,15 @@ def force_loops(robot: Robot) -> RobotForceLoopParameters:
     )
 
 
-def _force_loop(machine: Machine, low: float, high: float) -> ForceLoopParameters:
+def _force_loop(machine: Machine, low: float, high: float) -> DriveLoopParameters:
     c, v, stroke = machine.cylinder, machine.valve, 0.5 * (low + high)
     lifting = c.volume_lifting_0 + c.area_lifting * stroke
     lowering = c.volume_lowering_0 - c.area_lowering * stroke
     spring = c.beta * (c.area_lifting**2 / lifting + c.area_lowering**2 / lowering)
-    return ForceLoopParameters(
+    return DriveLoopParameters(
         gain=DAMPING_RATE / spring,
         time_constant=HIGH_PASS,
-        prefilter=PrefilterParameters(
-            area_lifting=c.area_lifting,
-            area_lowering=c.area_lowering,
-            flow_lifting=v.flow_nominal,
-            flow_lowering=v.flow_nominal * v.flow_ratio_lowering,
-            dead_zone=v.dead_zone,
-        ),
+        actuator=actuator(machine),
         limits=LimitParameters(
             speed=1.1 * v.flow_nominal / c.area_lifting, stroke_low=low, stroke_high=high
         ),
@@ -145,7 +168,7 @@ def _force_loop(machine: Machine, low: float, high: float) -> ForceLoopParameter
 
 
 def path_parameters(robot: Robot) -> RobotPathParameters:
-    """Return the picture of the arm as the robot's sheet makes it; the payload is not known."""
+    """Return the picture of the arm as the robot's sheet makes it; the payload is weighed."""
     g = robot.main.geometry
     return RobotPathParameters(
         arm=ArmParameters(
@@ -154,7 +177,8 @@ def path_parameters(robot: Robot) -> RobotPathParameters:
             arm_mass=g.boom_mass / g.arms,
             sections=g.sections_per_arm,
             section_spring=g.section_spring,
-        )
+        ),
+        supply=robot.main.supply.p0,
     )
 
 
@@ -166,7 +190,6 @@ def trajectory(
     Raises ParameterError for an unknown name.
     """
     reaches = tuple(reach(shape) for shape in robot.linkages)
-    drives = machines(robot, reaches)
     cylinders = [Cylinder(record(shape)[0]) for shape in robot.linkages]
     linkages: tuple[Linkage, ...] = (Motor(), *cylinders)
     by_number, margin = list(zip(cylinders, reaches, strict=True)), LimitParameters().end_margin
@@ -178,7 +201,10 @@ def trajectory(
             np.array([-math.pi, *(c.angle(of.stroke_low + margin) for c, of in by_number)]),
             np.array([math.pi, *(c.angle(of.stroke_high - margin) for c, of in by_number)]),
         ),
-        fastest=np.array([m.valve.flow_nominal / m.cylinder.area_lifting for m in drives]),
+        drives=tuple(Actuator(actuator(machine)) for machine in machines(robot, reaches)),
+        supply=Supply(path.supply, robot.pump.flow_max),
         move=move,
         line=path.line,
+        weigh=bool(path.weigh),
+        joint=path.joint,
     )

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from emir_analysis.signals import Recording
+from emir_analysis.thinning import thinned
 
 ROW_HEIGHT = 210  # pixels
 COLORS = ("#0b6bb5", "#d1622b", "#2e8b57", "#8e44ad", "#b8860b", "#c2185b", "#00838f", "#5d4037")
@@ -86,10 +87,10 @@ def _trace(run: Recording, line: Line, color: str) -> go.Scatter | None:
     name = next((name for name in line.names if name in run.signals), None)
     if name is None:
         return None
-    signal = run[name]
+    time, value = thinned(run[name].time, run[name].value)
     return go.Scatter(
-        x=signal.time.astype(np.float32),  # a screen has no more digits, the file half the size
-        y=(signal.value * line.factor).astype(np.float32),
+        x=time.astype(np.float32),  # a screen has no more digits, the file half the size
+        y=(value * line.factor).astype(np.float32),
         mode="lines",
         line={
             "color": WANTED if name.startswith("reference") else color,

@@ -13,6 +13,7 @@ from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
 from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
 from emir_analysis.robot_metrics import robot_metrics
+from emir_analysis.robot_picture import write_picture
 from emir_analysis.robot_report import headline as robot_headline
 from emir_analysis.robot_report import robot_plots
 from emir_analysis.run_plots import HYDRAULICS, MOTION, plot
@@ -126,6 +127,13 @@ def write_report(runs: Sequence[RunAnalysis], file: Path) -> None:
         told = list(run.about.items())
         blocks.append(Table(("", ""), told) if told else Text("It says nothing."))
     write_html(file, f"EMIR run: {', '.join(names)}", blocks)
+
+
+def write_path(runs: Sequence[RunAnalysis], file: Path) -> None:
+    """Write the picture of the robot's TCP on its way. Raises InputError for runs of joint 1."""
+    if not is_robot(runs[0].recording):
+        raise InputError("--picture: is of the whole robot, this is a run of joint 1")
+    write_picture(dict(zip(_names(runs), (run.recording for run in runs), strict=True)), file)
 
 
 def _names(runs: Sequence[RunAnalysis]) -> list[str]:

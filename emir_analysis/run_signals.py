@@ -67,8 +67,13 @@ def is_robot(recording: Recording) -> bool:
 
 
 def full_name(topic: Topic, there: set[str]) -> str | None:
+    """Return the recorded topic of the table's, whatever its namespace."""
+    return full_name_of(topic.name, there)
+
+
+def full_name_of(relative: str, there: set[str]) -> str | None:
     """Return the recorded topic with that relative name, whatever its namespace."""
-    found = [name for name in there if name.endswith(f"/{topic.name}")]
+    found = [name for name in there if name.endswith(f"/{relative}")]
     return min(found, key=len) if found else None
 
 

@@ -1,6 +1,5 @@
 """From recorded messages to named signals: time, value, unit."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis import bags
+from emir_analysis import columns
 from emir_analysis.errors import InputError
 from emir_common.quantity import ParameterError
 from emir_common.yaml_file import read_map
@@ -59,12 +58,20 @@ def load(path: Path, signal_map: SignalMap) -> Recording:
     of order in time or shorter than two samples.
     """
     sources = {name: Source(*source) for name, source in signal_map.items()}
-    messages = bags.read(path, {source.topic for source in sources.values()})
-    start = min(recorded[0].stamp for recorded in messages.values())
-    signals = {
-        name: _signal(path, name, source, messages[source.topic], start)
-        for name, source in sources.items()
+    wanted: dict[str, list[str]] = {}
+    for source in sources.values():
+        wanted.setdefault(source.topic, []).append(source.field)
+    found = columns.read(path, {topic: dict.fromkeys(paths) for topic, paths in wanted.items()})
+    start = min(int(of_topic.stamp[0]) for of_topic in found.values())
+    times = {
+        topic: _times(f"{path}: {topic}", of_topic.stamp, start)
+        for topic, of_topic in found.items()
     }
+    signals = {}
+    for name, source in sources.items():
+        time, value = times[source.topic], found[source.topic].values[source.field]
+        _check_finite(f"{path}: {source.topic}", source.field, time, value)
+        signals[name] = Signal(name, time, value, source.unit)
     return Recording(signals, start)
 
 
@@ -85,37 +92,21 @@ def _source(file: Path, name: str, entry: Any) -> Source:
     return Source(str(entry["topic"]), str(entry["field"]), str(entry["unit"]))
 
 
-def _signal(
-    path: Path, name: str, source: Source, messages: list[bags.Message], start: int
-) -> Signal:
-    where = f"{path}: {source.topic}"
-    if len(messages) < FEWEST_SAMPLES:
-        raise InputError(f"{where}: {len(messages)} message, too few for a signal")
-    time = np.array([message.stamp - start for message in messages]) * 1e-9
+def _times(where: str, stamps: columns.Times, start: int) -> Array:
+    """Return the stamps as times from the start, ns, in s."""
+    if stamps.size < FEWEST_SAMPLES:
+        raise InputError(f"{where}: {stamps.size} message, too few for a signal")
+    time = np.asarray((stamps - start) * 1e-9)
     behind = np.flatnonzero(np.diff(time) <= 0.0)
     if behind.size:
         raise InputError(f"{where}: stamps out of order at {time[behind[0] + 1]:.3f} s")
-    value = _values(messages, source.field, where)
+    return time
+
+
+def _check_finite(where: str, field: str, time: Array, value: Array) -> None:
     bad = np.flatnonzero(~np.isfinite(value))
     if bad.size:
         raise InputError(
-            f"{where}: {source.field} is {value[bad[0]]} at {time[bad[0]]:.3f} s"
+            f"{where}: {field} is {value[bad[0]]} at {time[bad[0]]:.3f} s"
             f" ({bad.size} of {value.size} samples)"
         )
-    return Signal(name, time, value, source.unit)
-
-
-def _values(messages: list[bags.Message], field: str, where: str) -> Array:
-    steps = [int(i) if i else name for name, i in re.findall(r"([A-Za-z_]\w*)|\[(\d+)\]", field)]
-    value = np.empty(len(messages))
-    try:
-        for k, message in enumerate(messages):
-            found = message.data
-            for step in steps:
-                found = found[step] if isinstance(step, int) else getattr(found, step)
-            value[k] = float(found)
-    except (AttributeError, IndexError):
-        raise InputError(f"{where}: message {k} has no field {field}") from None
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: field {field} is not a number") from None
-    return value

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis import bags
+from emir_analysis import bags, columns
 from emir_analysis.errors import InputError
 from emir_analysis.run_signals import full_name
-from emir_msgs_py import conversions
 from emir_msgs_py.topics import Topic
 
 Array = NDArray[np.float64]
@@ -74,22 +73,23 @@ def by_stamp(bag: Path, topics: Sequence[Topic], period: int) -> dict[int, Signa
     for name, full in names.items():
         if full is None:
             raise InputError(f"{bag}: no topic {name}; there are {', '.join(sorted(there))}")
-    messages = bags.read(bag, {full for full in names.values() if full})
-    found: list[dict[int, Signals]] = []
-    for topic in topics:
-        full = names[topic.name] or ""
-        try:
-            found.append(
-                {
-                    message.stamp: conversions.values(topic, message.data)
-                    for message in messages[full]
-                    if message.stamp % period == 0
-                }
-            )
-        except LookupError as error:
-            raise InputError(f"{bag}: {full}: {error}") from None
+    paths = {topic.name: [about.path for about in topic.fields.values()] for topic in topics}
+    recorded = columns.read(bag, {full: paths[name] for name, full in names.items() if full})
+    found = [_rows(topic, recorded[names[topic.name] or ""], period) for topic in topics]
     stamps = set(found[0]).intersection(*found[1:])
     return {
         stamp: {name: value for of_topic in found for name, value in of_topic[stamp].items()}
         for stamp in stamps
+    }
+
+
+def _rows(topic: Topic, recorded: columns.Columns, period: int) -> dict[int, Signals]:
+    """Return a topic's signals by those stamps that are multiples of the period, ns."""
+    due = recorded.stamp % period == 0
+    series = [recorded.values[about.path][due].tolist() for about in topic.fields.values()]
+    rows = zip(*series, strict=True)
+    names = tuple(topic.fields)
+    return {
+        stamp: dict(zip(names, row, strict=True))
+        for stamp, row in zip(recorded.stamp[due].tolist(), rows, strict=True)
     }

@@ -20,13 +20,14 @@ from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
 from emir_analysis.compare import REST_PRESSURE, Run, dynamic_deflection
 from emir_analysis.limit import PAPER_MOVE, Move, least
 from emir_analysis.machine_model import actuator, boom_table
-from emir_analysis.outer_loop import (
-    CascadeLoop,
-    LqgLoop,
-    OuterLoop,
-    PfcLoop,
-    PfcTipLoop,
-    ShapedLoop,
+from emir_analysis.node_controls import (
+    CascadeControl,
+    LqgControl,
+    MpcControl,
+    PfcControl,
+    PfcTipControl,
+    ShapedControl,
+    Stepping,
 )
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
@@ -121,7 +122,7 @@ def _stated(machine: Machine, among: Range) -> Machine:
     return with_values(machine, values)
 
 
-def controllers(machine: Machine, among: Range = EVERYDAY) -> dict[str, OuterLoop]:
+def controllers(machine: Machine, among: Range = EVERYDAY) -> dict[str, Stepping]:
     """Return what is compared, by name; each knows the machine as stated and the delay."""
     joint = pfc_file.load(pfc_file.default_file(STROKE), STROKE)
     tip = pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)
@@ -133,19 +134,19 @@ def controllers(machine: Machine, among: Range = EVERYDAY) -> dict[str, OuterLoo
     )
     conventional = Cascade(CascadeParameters())
     shapers = {
-        name: ShapedLoop(
+        name: ShapedControl(
             ShapedCascade(ShapedParameters(boom=lqg.boom, cascade=conventional, shaper=name))
         )
         for name in get_args(Shaper)
     }
-    others = {"mpc": LqgLoop(Mpc(lqg), "mpc")} if find_spec("osqp") else {}
+    others = {"mpc": MpcControl(Mpc(lqg))} if find_spec("osqp") else {}
     return {
-        "cascade": CascadeLoop(),
+        "cascade": CascadeControl(),
         **shapers,
-        "pfc": PfcLoop(Pfc(joint)),
-        "pfc_tip": PfcTipLoop(Tip(Pfc(tip))),
+        "pfc": PfcControl(Pfc(joint)),
+        "pfc_tip": PfcTipControl(Tip(Pfc(tip))),
         **others,
-        "lqg": LqgLoop(Lqg(lqg)),
+        "lqg": LqgControl(Lqg(lqg)),
     }
 
 
@@ -178,7 +179,7 @@ def trajectory(draw: Draw, wait: float) -> AwayAndBack:
     return named("lift-lower" if draw.stroke > 0.0 else "lower-lift", parameters)
 
 
-def run(draw: Draw, outer: OuterLoop, among: Range = EVERYDAY) -> Run:
+def run(draw: Draw, outer: Stepping, among: Range = EVERYDAY) -> Run:
     """Return the signals of a run. Raises SimulationError where the machine cannot do it."""
     loop = ClosedLoop(Plant(draw.machine), trajectory(draw, among.wait), outer)
     return loop.run(draw.angle, REST_PRESSURE, among.wait + PAPER_MOVE.duration + WATCHED)
@@ -189,7 +190,7 @@ def smallest(draw: Draw) -> float:
     return least(draw.machine, Move(draw.angle, draw.stroke, PAPER_MOVE.duration)).largest
 
 
-def score(draw: Draw, outer: OuterLoop, limit: float, among: Range = EVERYDAY) -> Score:
+def score(draw: Draw, outer: Stepping, limit: float, among: Range = EVERYDAY) -> Score:
     """Return the figures of a run, against the limit, m."""
     try:
         signals = run(draw, outer, among)

@@ -156,6 +156,51 @@ class Actuator:
             out = _turbulent(oil.lifting - p.tank, resistance)
         return -out, self._pumped(o * p.static.flow_lowering, oil.lowering)
 
+    def ahead(self, oil: Oil, opening: float, velocity: float, dt: float) -> Oil:
+        """Return the oil dt, s, later, with an opening and a piston velocity, m/s (midpoint)."""
+        middle = self._changed(oil, oil, opening, velocity, 0.5 * dt)
+        return self._changed(oil, middle, opening, velocity, dt)
+
+    def _changed(self, oil: Oil, at: Oil, opening: float, velocity: float, dt: float) -> Oil:
+        """Return the oil after dt, s, at the rates of another instant's."""
+        s, beta = self.parameters.static, self.softness * self.parameters.beta
+        lifting, lowering = self._shares(at.stroke)
+        into_lifting, into_lowering = self.flows(opening, at)
+        up = beta * lifting * (into_lifting / s.area_lifting - velocity)
+        down = beta * lowering * (into_lowering / s.area_lowering + velocity)
+        return Oil(
+            oil.stroke + velocity * dt,
+            max(oil.lifting + up * dt, 0.0),
+            max(oil.lowering + down * dt, 0.0),
+            self.next_logic(oil.logic, at.lifting, dt),
+        )
+
+    def supply_needed(self, force: float, velocity: float) -> float:
+        """Return the pump's pressure, Pa, that a steady motion takes with the valve fully open.
+
+        force: on the piston, N. velocity: m/s; at rest the shut valve holds, and it is 0.
+        """
+        p, s = self.parameters, self.parameters.static
+        if velocity == 0.0:
+            return 0.0
+        into, out, edge, flow = s.area_lifting, s.area_lowering, p.edge_lifting, s.flow_lifting
+        if velocity < 0.0:
+            into, out, edge, flow = out, into, p.edge_lowering + p.block_out, s.flow_lowering
+        back = p.tank + (edge + p.return_line) * (out * velocity) ** 2
+        pushed = ((force if velocity > 0.0 else -force) + back * out) / into
+        return pushed + (p.pump_line + p.balance / flow**2) * (into * velocity) ** 2
+
+    def pumped(self, velocity: float) -> float:
+        """Return what the pump has to give for a velocity, m/s, in steady motion, m^3/s."""
+        s = self.parameters.static
+        return velocity * s.area_lifting if velocity > 0.0 else -velocity * s.area_lowering
+
+    @cached_property
+    def fastest(self) -> float:
+        """What the fully open valve gives the piston, lifting, m/s."""
+        s = self.parameters.static
+        return s.flow_lifting / s.area_lifting
+
     def next_logic(self, logic: float, lifting: float, dt: float) -> float:
         """Return the logic block's opening dt, s, later, p_H being the pressure, Pa."""
         p = self.parameters

@@ -60,7 +60,7 @@ class Arm:
     def jacobian(self, joints: Array) -> Array:
         """Return d(x, y, z, pitch)/d(joints), (4, 6), of the arm with its bending held."""
         p, base = self.parameters, joints[0]
-        forward, up = self._ends(self._directions(joints))
+        forward, up = self.ends(joints)
         pivots = np.arange(len(JOINTS) - 1) * p.sections
         outward, upward = forward[-1] - forward[pivots], up[-1] - up[pivots]
         slope = np.zeros((len(PLACE), len(JOINTS)))
@@ -68,6 +68,10 @@ class Arm:
         slope[0, 1:], slope[1, 1:] = -math.cos(base) * upward, -math.sin(base) * upward
         slope[2, 1:], slope[3, 1:] = outward, 1.0
         return slope
+
+    def ends(self, joints: Array) -> tuple[Array, Array]:
+        """Return how far out and up the sections' ends are from joint 1, (n + 1,) each, m."""
+        return self._ends(self._directions(joints))
 
     def _directions(self, joints: Array) -> Array:
         """Return the sections' directions over the horizontal, (n,), rad.
@@ -99,7 +103,6 @@ class Arm:
         return np.asarray(GRAVITY * (torque - beyond * forward[:-1]))
 
     def _ends(self, direction: Array) -> tuple[Array, Array]:
-        """Return how far out and up the sections' ends are from joint 1, (n + 1,) each, m."""
         length = self.parameters.arm_length / self.parameters.sections
         start = np.zeros(1)
         forward = np.concatenate((start, np.cumsum(length * np.cos(direction))))

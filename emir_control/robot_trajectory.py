@@ -1,10 +1,11 @@
-"""Desired motion of all six joints: joint 1 away and back, or the TCP along a straight line.
+"""Desired motion of all six joints: one of them away and back, or the TCP along a straight line.
 
 Either is a path, the same for way and way back, and a trapezoidal velocity along it. A path starts
 where the joints are measured to be.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
+from emir_control.actuator import Actuator
 from emir_control.arm import JOINTS, Arm
+from emir_control.arm_forces import torques_along, weighed
 from emir_control.inverse import Ranges, ReachError, follow
 from emir_control.trajectory import (
     AwayAndBack,
@@ -28,7 +31,11 @@ Array = NDArray[np.float64]
 
 LINE = "line"
 SPACING = 0.05  # m of a line between two of its places that are computed
-POINTS = 41  # of a path of joint 1
+POINTS = 41  # of a path of one joint
+STEP = 1e-6  # rad, for the slope of a linkage
+HEAVIEST = 3000.0  # kg, that a payload is taken for
+BAR = 1e5  # Pa
+LITRE = 1e-3 / 60.0  # m^3/s in a litre per minute
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,30 +71,45 @@ class Linkage(Protocol):
         """Return the angle, rad, at the stroke, m."""
 
 
+class Supply(NamedTuple):
+    """The pump that feeds all drives."""
+
+    pressure: float  # Pa
+    flow: float  # m^3/s
+
+
 class RobotReference(NamedTuple):
     """The desired motion at one instant, (6,) each, base first, and the TCP's place, (4,)."""
 
     strokes: Array  # m; rad for the base
     velocities: Array  # m/s; rad/s for the base
     place: Array  # x, y, z, pitch
+    forces: Array  # of the pistons, that this motion takes, N; N m for the base
 
 
 class RobotTrajectoryInputs(NamedTuple):
     """What the trajectory needs to know."""
 
     angles: Array  # of the joints, measured, (6,), rad
+    forces: Array | None = None  # of the pistons, measured, (6,), N; None: the payload is told
 
 
 @dataclass(frozen=True)
 class Path:
-    """Strokes and places over the way along the path, m."""
+    """Strokes, places and forces over the way along the path, m.
+
+    forces: (3, 6), at rest, per squared speed and per acceleration along the path.
+    """
 
     strokes: CubicSpline
     places: CubicSpline
+    forces: CubicSpline
 
-    def at(self, way: float, speed: float) -> RobotReference:
-        """Return the reference on the way, m, at a speed along it, m/s."""
-        return RobotReference(self.strokes(way), self.strokes(way, 1) * speed, self.places(way))
+    def at(self, way: float, speed: float, acceleration: float) -> RobotReference:
+        """Return the reference on the way, m, at a speed along it, m/s, that changes, m/s^2."""
+        forces = np.array([1.0, speed * speed, acceleration]) @ self.forces(way)
+        velocities = self.strokes(way, 1) * speed
+        return RobotReference(self.strokes(way), velocities, self.places(way), forces)
 
 
 class RobotTrajectoryState(NamedTuple):
@@ -96,23 +118,28 @@ class RobotTrajectoryState(NamedTuple):
     path: Path
     timing: Motion
     ticks: int  # control periods since the start
+    arm: Arm  # with the payload that was found
 
 
 @dataclass(frozen=True)
 class RobotTrajectory:
     """A path of all joints, away and back.
 
-    name: a move of joint 1's piston (lift-lower, lower-lift, hold) or line. ranges: of the
-    joints. fastest: what the valves give the pistons, (6,), m/s.
+    name: a move of one joint's piston (lift-lower, lower-lift, hold) or line. joint: which one,
+    0 being the base. ranges: of the joints. supply: what the pump gives at most. weigh: read the
+    payload off the pistons' forces.
     """
 
     name: str
     arm: Arm
     linkages: tuple[Linkage, ...]
     ranges: Ranges
-    fastest: Array
+    drives: tuple[Actuator, ...]
+    supply: Supply
     move: TrajectoryParameters
     line: LineParameters
+    weigh: bool = False
+    joint: int = 1
 
     def __post_init__(self) -> None:
         if self.name != LINE:
@@ -127,15 +154,27 @@ class RobotTrajectory:
         Raises ReachError where the arm or a joint's range ends or a valve is too small.
         """
         angles = np.asarray(inputs.angles, dtype=np.float64)
+        if self.weigh and inputs.forces is not None:
+            payload = weighed(self.arm, angles, inputs.forces * _ratios(self.linkages, angles))
+            arm = Arm(replace(self.arm.parameters, payload=min(payload, HEAVIEST)))
+            return replace(self, arm=arm, weigh=False).initial(inputs)
         path, timing = self._line(angles) if self.name == LINE else self._piston(angles)
-        return RobotTrajectoryState(path, AwayAndBack(timing), 0)
+        return RobotTrajectoryState(path, AwayAndBack(timing), 0, self.arm)
 
     def step(
         self, state: RobotTrajectoryState, inputs: RobotTrajectoryInputs, dt: float
     ) -> tuple[RobotTrajectoryState, RobotReference]:
         """Return the reference of this control period of dt, s."""
-        way = state.timing.at(state.ticks * dt)
-        return state._replace(ticks=state.ticks + 1), state.path.at(way.stroke, way.velocity)
+        time = state.ticks * dt
+        way = state.timing.at(time)
+        before, after = (state.timing.at(time + side * dt).velocity for side in (-0.5, 0.5))
+        reference = state.path.at(way.stroke, way.velocity, (after - before) / dt)
+        return state._replace(ticks=state.ticks + 1), reference
+
+    def ahead(self, state: RobotTrajectoryState, count: int, dt: float) -> Array:
+        """Return the strokes, (count, 6), of the periods that follow the next step's own."""
+        times = ((state.ticks + k) * dt for k in range(1, count + 1))
+        return np.asarray(state.path.strokes([state.timing.at(time).stroke for time in times]))
 
     def held(self, state: RobotTrajectoryState, dt: float) -> RobotTrajectoryState:
         """Return the state that comes to rest on its path and stays there."""
@@ -148,9 +187,10 @@ class RobotTrajectory:
         _, now = self.step(state, RobotTrajectoryInputs(np.empty(0)), dt)
         begin = [Reference(*map(float, pair)) for pair in zip(*now[:2], strict=True)]
         strokes = curve(points, self._axes(), begin)
-        places = [self.arm.tcp(self._angles(row)) for row in strokes(strokes.x)]
-        path = Path(strokes, CubicSpline(strokes.x, np.array(places)))
-        return RobotTrajectoryState(path, Along(float(strokes.x[-1])), 0)
+        joints = np.array([self._angles(row) for row in strokes(strokes.x)])
+        places = CubicSpline(strokes.x, np.array([state.arm.tcp(row) for row in joints]))
+        path = Path(strokes, places, _forces(state.arm, self.linkages, strokes.x, joints))
+        return RobotTrajectoryState(path, Along(float(strokes.x[-1])), 0, state.arm)
 
     def _angles(self, strokes: Array) -> Array:
         pairs = zip(self.linkages, strokes.tolist(), strict=True)
@@ -161,7 +201,7 @@ class RobotTrajectory:
         axes = []
         for k, (name, of) in enumerate(zip(JOINTS, self.linkages, strict=True)):
             ends = (of.stroke(float(self.ranges.low[k])), of.stroke(float(self.ranges.high[k])))
-            axes.append(Axis(name, of, min(ends), max(ends), float(self.fastest[k])))
+            axes.append(Axis(name, of, min(ends), max(ends), self.drives[k].fastest))
         return axes
 
     def _line(self, start: Array) -> tuple[Path, Timing]:
@@ -180,15 +220,14 @@ class RobotTrajectory:
 
     def _piston(self, start: Array) -> tuple[Path, Timing]:
         distance = distance_of(self.name, self.move)
-        first = self.linkages[1].stroke(start[1])
+        linkage, name, k = self.linkages[self.joint], JOINTS[self.joint], self.joint
+        first = linkage.stroke(start[k])
         ways = np.linspace(0.0, abs(distance) or 1.0, POINTS)
         joints = np.tile(start, (POINTS, 1))
         if distance:
-            sign = np.sign(distance)
-            joints[:, 1] = [self.linkages[1].angle(first + sign * way) for way in ways]
-        low, high = self.ranges.low[1], self.ranges.high[1]
-        if not ((low <= joints[:, 1]) & (joints[:, 1] <= high)).all():
-            raise ReachError(f"{self.name}: joint1 would go beyond the end of its stroke")
+            joints[:, k] = [linkage.angle(first + np.sign(distance) * way) for way in ways]
+        if not ((self.ranges.low[k] <= joints[:, k]) & (joints[:, k] <= self.ranges.high[k])).all():
+            raise ReachError(f"{self.name}: {name} would go beyond the end of its stroke")
         places = np.array([self.arm.tcp(angles) for angles in joints])
         path = self._path(ways, joints, places, self.move.speed)
         return path, Timing(
@@ -199,13 +238,54 @@ class RobotTrajectory:
         strokes = np.array(
             [[of.stroke(a) for of, a in zip(self.linkages, row, strict=True)] for row in joints]
         )
-        path = Path(CubicSpline(ways, strokes), CubicSpline(ways, places))
-        needed = np.abs(path.strokes(ways, 1)).max(axis=0) * speed
-        for name, wanted, fastest in zip(JOINTS, needed, self.fastest, strict=True):
-            if wanted > fastest:
+        forces = _forces(self.arm, self.linkages, ways, joints)
+        path = Path(CubicSpline(ways, strokes), CubicSpline(ways, places), forces)
+        self._check_drives(path.strokes(ways, 1) * speed, path.forces(ways)[:, 0])
+        return path
+
+    def _check_drives(self, velocities: Array, forces: Array) -> None:
+        """Raise ReachError where valves or pump do not give a way's velocities, (n, 6).
+
+        forces: (n, 6), at rest. The way back counts as well.
+        """
+        needed = np.abs(velocities).max(axis=0)
+        for name, wanted, drive in zip(JOINTS, needed, self.drives, strict=True):
+            if wanted > drive.fastest:
                 unit, factor = ("rad/s", 1.0) if name == "base" else ("mm/s", 1e3)
                 raise ReachError(
                     f"{name} would have to move at {wanted * factor:.3g} {unit},"
-                    f" its valve gives {fastest * factor:.3g}"
+                    f" its valve gives {drive.fastest * factor:.3g}"
                 )
-        return path
+        velocities = np.concatenate((velocities, -velocities))  # the way back takes other forces
+        most, name = max(
+            (drive.supply_needed(float(force), float(velocity)), name)
+            for name, drive, *columns in zip(
+                JOINTS, self.drives, np.tile(forces, (2, 1)).T, velocities.T, strict=True
+            )
+            for force, velocity in zip(*columns, strict=True)
+        )
+        if most > self.supply.pressure:
+            raise ReachError(
+                f"with {self.arm.parameters.payload:.0f} kg {name} would need {most / BAR:.0f} bar,"
+                f" the pump gives {self.supply.pressure / BAR:.0f}"
+            )
+        flows = [[d.pumped(v) for d, v in zip(self.drives, row, strict=True)] for row in velocities]
+        flow = max(map(sum, flows))
+        if flow > self.supply.flow:
+            raise ReachError(
+                f"the joints together would need {flow / LITRE:.0f} l/min,"
+                f" the pump gives {self.supply.flow / LITRE:.0f}"
+            )
+
+
+def _forces(arm: Arm, linkages: Sequence[Linkage], ways: Array, joints: Array) -> CubicSpline:
+    """Return the pistons' forces over the way; see Path."""
+    ratios = np.array([_ratios(linkages, row) for row in joints])
+    return CubicSpline(ways, torques_along(arm, ways, joints) / ratios[:, np.newaxis])
+
+
+def _ratios(linkages: Sequence[Linkage], angles: Array) -> Array:
+    """Return dh/d(angle) of the joints, (6,), m."""
+    pairs = zip(linkages, map(float, angles), strict=True)
+    ends = [(of.stroke(angle + STEP), of.stroke(angle - STEP)) for of, angle in pairs]
+    return np.array([(high - low) / (2.0 * STEP) for high, low in ends])

@@ -10,7 +10,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from emir_msgs_py.topics import JOINT_STATE, Topic
+from emir_msgs_py.topics import JOINT_STATE, Field, Topic
 
 NANOSECONDS = 1_000_000_000
 _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?")
@@ -44,7 +44,16 @@ def _steps(path: str) -> tuple[tuple[str, int | None], ...]:
 
 def values(topic: Topic, message: Any) -> dict[str, float]:
     """Return the topic's signals by name; raises LookupError when a field is missing."""
-    return {name: field_value(message, field.path) for name, field in topic.fields.items()}
+    return {name: _value(message, field) for name, field in topic.fields.items()}
+
+
+def _value(message: Any, field: Field) -> float:
+    try:
+        return field_value(message, field.path)
+    except LookupError:
+        if field.absent is None:
+            raise
+        return field.absent
 
 
 def stamp_ns(message: Any) -> int:

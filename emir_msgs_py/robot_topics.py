@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from emir_msgs_py.topics import (
+    CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
     JOINT_STATES,
+    PFC_TERMS,
     TRUTH,
     VALVE_COMMAND,
     VELOCITY_COMMAND,
@@ -42,14 +44,20 @@ def _units(joint: str, unit: str) -> str:
 
 
 def _six(
-    topic: Topic, frame: str, *quantities: tuple[str, str, str], every: Every | None = None
+    topic: Topic,
+    frame: str,
+    *quantities: tuple[str, str, str],
+    every: Every | None = None,
+    optional: Sequence[str] = (),
 ) -> Topic:
     """Return a topic of joint 1 for six: quantities are (signal, array of the message, unit).
 
-    every: its period, if that is another.
+    every: its period, if that is another. optional: signals that are 0 where they are left out.
     """
     fields = {
-        f"{joint}_{signal}": Field(f"{array}[{i}]", _units(joint, unit))
+        f"{joint}_{signal}": Field(
+            f"{array}[{i}]", _units(joint, unit), 0.0 if signal in optional else None
+        )
         for signal, array, unit in quantities
         for i, joint in enumerate(JOINTS)
     }
@@ -99,13 +107,31 @@ ROBOT_TRUTH = named_numbers(
 ROBOT_CYLINDER_REFERENCE = _six(
     CYLINDER_REFERENCE, GROUND,
     ("reference_stroke", "position", "m"), ("reference_velocity", "velocity", "m/s"),
+    ("reference_force", "effort", "N"),
+)  # fmt: skip
+ROBOT_CYLINDER_PREVIEW = named_numbers(
+    CYLINDER_PREVIEW.name, CYLINDER_PREVIEW.publisher, "control",
+    {
+        f"{joint}_{name}": _units(joint, field.unit)
+        for joint in JOINTS
+        for name, field in CYLINDER_PREVIEW.fields.items()
+    },
+    "command",
 )  # fmt: skip
 TCP_REFERENCE = _pose("tcp_reference", "trajectory_node", "tcp_reference", "command")
-ROBOT_VELOCITY_COMMAND = _six(VELOCITY_COMMAND, GROUND, ("velocity_command", "velocity", "m/s"))
+ROBOT_VELOCITY_COMMAND = _six(
+    VELOCITY_COMMAND, GROUND,
+    ("velocity_command", "velocity", "m/s"), ("expected_force", "effort", "N"),
+    optional=("expected_force",),
+)  # fmt: skip
 ROBOT_VALVE_COMMAND = _six(VALVE_COMMAND, GROUND, ("valve_command", "position", "1"), every="plant")
 ROBOT_CASCADE_TERMS = _terms(
     "cascade/terms", "cascade_node", "control",
     (("feedforward", "m/s"), ("feedback", "m/s"), ("smoothed_reference", "m")),
+)  # fmt: skip
+ROBOT_PFC_TERMS = _terms(
+    PFC_TERMS.name, PFC_TERMS.publisher, "control",
+    [(name, field.unit) for name, field in PFC_TERMS.fields.items()],
 )  # fmt: skip
 ROBOT_FORCE_LOOP_TERMS = _terms(
     "force_loop/terms", "force_loop_node", "plant",
@@ -115,6 +141,6 @@ ROBOT_FORCE_LOOP_TERMS = _terms(
 
 ROBOT_TOPICS: tuple[Topic, ...] = (
     ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES, PRESSURES, TCP_POSE, TCP_DEFLECTION, ROBOT_TRUTH,
-    ROBOT_CYLINDER_REFERENCE, TCP_REFERENCE, ROBOT_VELOCITY_COMMAND, ROBOT_VALVE_COMMAND,
-    ROBOT_CASCADE_TERMS, ROBOT_FORCE_LOOP_TERMS,
+    ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, TCP_REFERENCE, ROBOT_VELOCITY_COMMAND,
+    ROBOT_VALVE_COMMAND, ROBOT_CASCADE_TERMS, ROBOT_PFC_TERMS, ROBOT_FORCE_LOOP_TERMS,
 )  # fmt: skip

@@ -58,15 +58,6 @@ class Truth(NamedTuple):
     tcp_deflection: float  # off the line of the first section, up positive, m
 
 
-@compiled
-def _dot(a: Array, b: Array) -> float:
-    """Return the inner product; on a handful of numbers a loop is faster than BLAS."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total
-
-
 class _Motion(NamedTuple):
     """The boom and the piston at an instant; SI units."""
 
@@ -83,15 +74,18 @@ class _Motion(NamedTuple):
 @compiled
 def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
-    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
-    angle = _dot(p.mode_joint, position)
+    angle, tip_angle, turning = 0.0, 0.0, 0.0
+    for i in range(n):
+        angle += p.mode_joint[i] * x[MODES + i]
+        tip_angle += p.mode_tip_angle[i] * x[MODES + i]
+        turning += p.mode_joint[i] * x[MODES + n + i]
     arm = linkage_error.lever_arm(angle, p)
-    joint_velocity = arm * _dot(p.mode_joint, rate)
+    joint_velocity = arm * turning
     force = chambers.piston_force(x[P_H], x[P_S], p)
     offset_rate = backlash.rate(x[OFFSET], force, p)
     return _Motion(
         angle,
-        _dot(p.mode_tip_angle, position),
+        tip_angle,
         arm,
         linkage_error.stroke(angle, p) + x[OFFSET],
         joint_velocity + offset_rate,
@@ -125,7 +119,12 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
 @compiled
 def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
     """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
-    p = parameters[0]
+    write_derivative_of(x, command, parameters[0], dx)
+
+
+@compiled
+def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
+    """As `write_derivative`, with the parameters of one machine."""
     motion = _motion(x, p)
     dry = terms.dry_friction(motion.joint_velocity, motion.force, p)
     _write_rates(x, command, motion, dry, p, dx)
@@ -175,18 +174,17 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
 @compiled
 def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> None:
     n = p.mode_joint.size
-    position, rate = x[MODES : MODES + n], x[MODES + n : MODES + 2 * n]
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
     torque = (motion.force - friction) * motion.arm
     gravity = math.cos(motion.angle)
     load = external_load.force(x[TIME], p)
     for i in range(n):
-        dx[MODES + i] = rate[i]
+        dx[MODES + i] = x[MODES + n + i]
         dx[MODES + n + i] = (
             p.mode_joint[i] * torque
             - p.mode_weight[i] * gravity
-            - p.mode_stiffness[i] * position[i]
-            - p.mode_damping[i] * rate[i]
+            - p.mode_stiffness[i] * x[MODES + i]
+            - p.mode_damping[i] * x[MODES + n + i]
             + p.mode_tip[i] * load
         )
 
@@ -194,10 +192,17 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
 @compiled
 def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     """Return what an ideal observer would read off the state."""
-    p = parameters[0]
+    return truth_of(x, parameters[0])
+
+
+@compiled
+def truth_of(x: Array, p: Any) -> Truth:
+    """As `truth`, with the parameters of one machine."""
     motion = _motion(x, p)
     flow_lifting, flow_lowering, _ = _valve_flows(x, p)
-    bending = _dot(p.mode_deflection, x[MODES : MODES + p.mode_joint.size])
+    bending = 0.0
+    for i in range(p.mode_deflection.size):
+        bending += p.mode_deflection[i] * x[MODES + i]
     load = external_load.force(x[TIME], p)
     return Truth(
         motion.angle,
@@ -216,13 +221,14 @@ def truth(x: Array, parameters: NDArray[Any]) -> Truth:
 
 
 @compiled
-def advance(
-    x: Array, command: float, dt: float, parameters: NDArray[Any], step: float = STEP
-) -> Array:
-    """Return the state after dt, s, under a constant command; RK4 in steps of at most `step`, s."""
+def step(x: Array, command: float, dt: float, parameters: NDArray[Any]) -> tuple[Array, Truth]:
+    """Return the state after dt, s, under a constant command, and its truth.
+
+    Both from one call: the way from Python and back costs more than a step of 1 ms.
+    """
     after = x.copy()
-    _advance(after, command, dt, step, parameters, np.zeros((5, x.size)))
-    return after
+    _advance(after, command, dt, STEP, parameters, np.zeros((5, x.size)))
+    return after, truth(after, parameters)
 
 
 @compiled
@@ -237,19 +243,27 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
         dry = _write_first_rates(x, arriving, h, p, k1)
-        for i in range(x.size):
-            between[i] = x[i] + 0.5 * h * k1[i]
+        _write_sum(x, 0.5 * h, k1, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k2)
-        for i in range(x.size):
-            between[i] = x[i] + 0.5 * h * k2[i]
+        _write_sum(x, 0.5 * h, k2, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k3)
-        for i in range(x.size):
-            between[i] = x[i] + h * k3[i]
+        _write_sum(x, h, k3, p, between)
         _write_rates(between, arriving, _motion(between, p), dry, p, k4)
-        for i in range(x.size):
+        for i in range(DELAY_LINE):
+            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+        for i in range(MODES, MODES + 2 * p.mode_joint.size):
             x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         x[P_H] = max(x[P_H], 0.0)
         x[P_S] = max(x[P_S], 0.0)
+
+
+@compiled
+def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
+    """Write x + h rates to result, but for the delay line: `command_delay` alone works on it."""
+    for i in range(DELAY_LINE):
+        result[i] = x[i] + h * rates[i]
+    for i in range(MODES, MODES + 2 * p.mode_joint.size):
+        result[i] = x[i] + h * rates[i]
 
 
 @compiled
@@ -258,9 +272,12 @@ def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) ->
     n = p.mode_joint.size
     motion = _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
-    gained = motion.arm * _dot(p.mode_joint, dx[MODES + n : MODES + 2 * n])
-    mobility = h * motion.arm * motion.arm * _dot(p.mode_joint, p.mode_joint)
-    unhindered = motion.joint_velocity + h * gained
+    turning, admittance = 0.0, 0.0
+    for i in range(n):
+        turning += p.mode_joint[i] * dx[MODES + n + i]
+        admittance += p.mode_joint[i] * p.mode_joint[i]
+    mobility = h * motion.arm * motion.arm * admittance
+    unhindered = motion.joint_velocity + h * (motion.arm * turning)
     dry = dry_friction.over_step(unhindered, mobility, motion.force, p)
     for i in range(n):
         dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry
@@ -278,7 +295,7 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
 ) -> Array:
     """Run a whole command sequence.
 
-    commands: (k,), each held for dt, s; step: as for `advance`. Returns
+    commands: (k,), each held for dt, s; step: the longest integration step, s. Returns
     (1 + k // every, len(Truth)): the truth at the start and after every `every` commands.
     """
     result = np.empty((1 + commands.size // every, len(truth(x, parameters))))
@@ -293,7 +310,7 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
 
 
 @compiled_parallel
-def simulate_many(  # noqa: PLR0913, PLR0917 (as _advance)
+def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
     starts: Array,
     commands: Array,
     dt: float,
@@ -301,7 +318,7 @@ def simulate_many(  # noqa: PLR0913, PLR0917 (as _advance)
     parameters: NDArray[Any],
     step: float = STEP,
 ) -> Array:
-    """Run m machines under the same commands, in parallel.
+    """Run m machines under the same commands, one by one on each core.
 
     starts: (m, n) states; parameters: (m,) records; step: as for `advance`. Returns
     (m, 1 + k // every, len(Truth)).

@@ -7,20 +7,25 @@ up; the joint torque is F r with r = dh/dalpha > 0. Paper equation (1), with its
 import math
 from typing import Any
 
-from emir_plant.jit import compiled
+from emir_plant.jit import compiled, square_root
+
+
+@compiled
+def third_side(a: float, b: float, enclosed: float) -> float:
+    """Return a triangle's third side, m, from two, m, and the angle that they enclose, rad."""
+    return square_root(a * a + b * b - 2.0 * a * b * math.cos(enclosed))
 
 
 @compiled
 def cylinder_length(angle: float, p: Any) -> float:
     """Return the distance from cylinder foot to rod eye, m, at the boom angle, rad."""
-    a, b = p.triangle_a, p.triangle_b
-    return math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(angle + p.triangle_gamma0))
+    return third_side(p.triangle_a, p.triangle_b, angle + p.triangle_gamma0)
 
 
 @compiled
 def stroke(angle: float, p: Any) -> float:
     """Return the piston stroke h, m, at the boom angle, rad."""
-    return cylinder_length(angle, p) - cylinder_length(0.0, p)
+    return cylinder_length(angle, p) - p.length_stretched
 
 
 @compiled
@@ -34,7 +39,7 @@ def lever_arm(angle: float, p: Any) -> float:
 def angle(stroke: float, p: Any) -> float:
     """Return the boom angle, rad, at the piston stroke, m."""
     a, b = p.triangle_a, p.triangle_b
-    length = cylinder_length(0.0, p) + stroke
+    length = p.length_stretched + stroke
     return math.acos((a * a + b * b - length * length) / (2.0 * a * b)) - p.triangle_gamma0
 
 

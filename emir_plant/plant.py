@@ -88,8 +88,7 @@ class Plant:
 
         The command is limited to [-1, 1]. Raises SimulationError when the state is not finite.
         """
-        after = core.advance(state, min(max(command, -1.0), 1.0), dt, self.record)
-        shown = core.truth(after, self.record)
+        after, shown = core.step(state, min(max(command, -1.0), 1.0), dt, self.record)
         if not math.isfinite(shown.force + shown.stroke + shown.velocity + shown.spool):
             raise SimulationError(f"the state is not finite after a step with y2 = {command!r}")
         return after, shown

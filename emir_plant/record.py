@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import quantities
 from emir_plant.boom import BoomModes, boom_modes
+from emir_plant.effects import REGISTRY
+from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine, groups
+
+EFFECT_FIELDS = tuple(
+    f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)
+)
+EFFECT_SIZES = tuple(f"{effect}_{size}" for effect, kind in REGISTRY.items() for size in kind.sizes)
 
 
 def record(machine: Machine) -> NDArray[Any]:
@@ -21,6 +28,9 @@ def record(machine: Machine) -> NDArray[Any]:
     geometry = _with_effects(machine)
     modes = boom_modes(geometry)
     values = _parameters(machine) | _modes(modes, geometry)
+    values["length_stretched"] = third_side(
+        geometry.triangle_a, geometry.triangle_b, geometry.triangle_gamma0
+    )
     layout = [(name, np.float64, np.shape(value)) for name, value in values.items()]
     return np.array([tuple(values.values())], dtype=layout)
 

@@ -16,21 +16,24 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rclpy
 from numpy.typing import NDArray
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.duration import Duration
 
-from emir_analysis import bags
+from emir_analysis import bags, columns
 from emir_analysis.bench.reading import reading_figures
 from emir_analysis.bench.timing import Figure, text, write_json
+from emir_analysis.columns import Columns
 from emir_analysis.errors import InputError
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
 from emir_ros import qos
 from emir_ros.graph import Plan
+from emir_ros.main import keep_out_of_garbage_collection, make_executor
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
 from emir_ros.wire import Wire, stamp_ns
@@ -40,6 +43,7 @@ Part = tuple[str, list[Figure]]
 
 START = 2.0  # s of simulated time in a short run, whose cost is that of starting and stopping
 RATES = (31.25, 1000.0)  # Hz, at which latency is measured
+NUMBER = "position[0]"  # of a JointState's message
 RECORDED_RATE = 25_000.0  # Hz
 SETTLING = 30.0  # s within which two processes have to find each other
 
@@ -122,7 +126,11 @@ def _run(plan: Plan, processes: str) -> None:
 
 
 def _latency(rate: float, seconds: float) -> Part:
-    """Measure from before `publish` in one process to the callback in another."""
+    """Measure from before `publish` in one process to the callback in another.
+
+    It begins when the first message has arrived: what is sent while both still get to know each
+    other waits for that.
+    """
     here, there = multiprocessing.get_context("spawn").Pipe()
     listener = multiprocessing.get_context("spawn").Process(target=_listen, args=(there,))
     listener.start()
@@ -130,41 +138,50 @@ def _latency(rate: float, seconds: float) -> Part:
     node = rclpy.create_node("bench_sender")
     wire, kind = Wire(JOINT_STATES), conversions.message_class(JOINT_STATES.type)
     publisher = node.create_publisher(kind, "bench", qos.offered(lockstep=False))
-    until = time.monotonic() + SETTLING
-    while not publisher.get_subscription_count() and time.monotonic() < until:
-        time.sleep(0.01)
+    _find_listener(publisher)
+    while not here.poll(0.01):
+        publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
+    here.recv()
+    keep_out_of_garbage_collection()
     period, sent = 1.0 / rate, 0
     begin = time.monotonic()
     while sent < rate * seconds:
         time.sleep(max(begin + sent * period - time.monotonic(), 0.0))
         publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
         sent += 1
+    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
     time.sleep(0.1)
     here.send("enough")
-    late = np.array(here.recv())
+    sent_at, late = np.array(here.recv()).T
     listener.join()
     node.destroy_node()
     rclpy.try_shutdown()
+    late = late[sent_at >= begin]
     title = f"Latency between two processes at {rate:g} Hz"
     return title, [*_spread(late), Figure("lost", 100.0 * (1.0 - late.size / sent), "%")]
 
 
 def _listen(connection: Connection) -> None:
-    """Report how long each message was on its way, s, once told that it is enough."""
+    """Say that a message came, then report when each was sent and how long it took, s."""
     rclpy.init()
     node = rclpy.create_node("bench_listener")
-    late: list[float] = []
+    heard: list[tuple[float, float]] = []
 
     def receive(data: bytes) -> None:
-        late.append((time.monotonic_ns() - stamp_ns(data)) * 1e-9)
+        sent = stamp_ns(data)
+        heard.append((sent * 1e-9, (time.monotonic_ns() - sent) * 1e-9))
 
     kind = conversions.message_class(JOINT_STATES.type)
     node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    while not connection.poll():
-        executor.spin_once(timeout_sec=0.1)
-    connection.send(late)
+    with make_executor() as executor:
+        executor.add_node(node)
+        keep_out_of_garbage_collection()
+        while not heard:
+            executor.spin_once(timeout_sec=0.1)
+        connection.send("heard")
+        while not connection.poll():
+            executor.spin_once(timeout_sec=0.1)
+    connection.send(heard)
     node.destroy_node()
     rclpy.try_shutdown()
 
@@ -184,14 +201,14 @@ def _spread(seconds: Array) -> list[Figure]:
 def _jitter(bag: Path, seconds: float) -> list[Figure]:
     """Return how far the control period of the running graph is from 32 ms."""
     _run(Plan(bag=bag, trajectory="hold", duration=seconds + START, lockstep=False), "many")
-    (stamps,) = (
-        [message.stamp for message in messages]
-        for name, messages in bags.read(bag).items()
-        if name.endswith(VALVE_COMMAND.name)
-    )
-    first = stamps[0] + START * 1e9  # when everybody has started
-    periods = np.diff([stamp for stamp in stamps if stamp >= first])
+    stamps = _recorded(bag, VALVE_COMMAND.name, NUMBER).stamp
+    periods = np.diff(stamps[stamps >= stamps[0] + START * 1e9])  # when everybody has started
     return _spread(np.abs(periods - CONTROL_PERIOD_NS) * 1e-9)
+
+
+def _recorded(bag: Path, topic: str, path: str) -> Columns:
+    """Return one number of a topic's messages in a recording."""
+    return columns.read(bag, {f"/{topic}": [path]})[f"/{topic}"]
 
 
 @contextmanager
@@ -208,7 +225,11 @@ def _busy_processors() -> Iterator[None]:
 
 
 def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
-    """Send messages to a recorder of its own process and count what it has recorded."""
+    """Send numbered messages to a recorder of its own process; look for them in its file.
+
+    Sender and recorder find each other while messages are sent already: the first one that is
+    recorded begins the count.
+    """
     words = ["--ros-args", "-p", f"bag:={bag}", "-p", f"topics:=[{JOINT_STATES.name}]"]
     recorder = subprocess.Popen(  # noqa: S603 (our own node)
         [sys.executable, "-P", "-m", "emir_ros.recorder_node", *words]
@@ -216,28 +237,39 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
     rclpy.init()
     node = rclpy.create_node("bench_sender")
     kind = conversions.message_class(JOINT_STATES.type)
-    publisher = node.create_publisher(kind, JOINT_STATES.name, qos.offered(lockstep=False))
+    profile = qos.offered(lockstep=False)
+    profile.depth = max(round(rate * qos.DEPTH * PLANT_PERIOD_NS * 1e-9), 1)
+    publisher = node.create_publisher(kind, JOINT_STATES.name, profile)
+    _find_listener(publisher)
     wire, sent = Wire(JOINT_STATES), 0
-    until = time.monotonic() + SETTLING
-    while not publisher.get_subscription_count() and time.monotonic() < until:
-        time.sleep(0.01)
     begin = time.monotonic()
     while (now := time.monotonic() - begin) < seconds:
         while sent < now * rate:
-            publisher.publish(wire.encode(time.time_ns(), {"angle": 0.0}))
+            publisher.publish(wire.encode(time.time_ns(), {"angle": float(sent)}))
             sent += 1
         time.sleep(1e-4)
-    time.sleep(0.5)
+    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
     recorder.send_signal(signal.SIGINT)
     recorder.wait()
     node.destroy_node()
     rclpy.try_shutdown()
-    recorded = sum(map(len, bags.read(bag).values())) if bag.exists() else 0
+    numbers = _recorded(bag, JOINT_STATES.name, NUMBER).values[NUMBER]
+    first = int(numbers.min())
     return f"Recorder, messages sent for {seconds:g} s", [
         Figure("sent", sent / now, "1/s"),
-        Figure("recorded", recorded / now, "1/s"),
-        Figure("lost", float(sent - recorded), "1"),
+        Figure("recorded", numbers.size / now, "1/s"),
+        Figure("lost", float(sent - first - numbers.size), "1"),
+        Figure("sent before the first one recorded", float(first), "1"),
     ]
+
+
+def _find_listener(publisher: Any) -> None:
+    """Wait until somebody listens to what is to be published."""
+    until = time.monotonic() + SETTLING
+    while not publisher.get_subscription_count():
+        if time.monotonic() > until:
+            raise NodeError(f"nobody listens to {publisher.topic_name} within {SETTLING:g} s")
+        time.sleep(0.01)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,14 @@
 
 from collections import Counter
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
+
+from emir_msgs_py.conversions import NANOSECONDS
+from emir_msgs_py.topics import DIAGNOSTICS
+from emir_ros import qos
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -47,16 +51,18 @@ class Diagnostics:
     """The one status of a node: said when it changes, and in real time again every second.
 
     counts: what has happened how often since the start; it and what `figures` returns are the
-    status's values.
+    status's values. now: ns, what a status is stamped with.
     """
 
-    def __init__(self, node: Node, *, repeat: bool) -> None:
-        self._node = node
+    def __init__(self, node: Node, now: "Callable[[], int]", *, lockstep: bool) -> None:
+        self._node, self._now = node, now
         self.counts: Counter[str] = Counter()
         self.figures: Callable[[], Mapping[str, str]] = dict
         self._said: tuple[Level, str] | None = None
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        if repeat:
+        self._publisher = node.create_publisher(
+            DiagnosticArray, DIAGNOSTICS, qos.offered(lockstep=True)
+        )
+        if not lockstep:
             node.create_timer(REPEAT, self._publish)
 
     def say(self, level: Level, message: str) -> None:
@@ -77,8 +83,8 @@ class Diagnostics:
         if self._said is None:
             return
         level, message = self._said
-        array = DiagnosticArray()
-        array.header.stamp = self._node.get_clock().now().to_msg()
+        array: Any = DiagnosticArray()
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._now(), NANOSECONDS)
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(level=bytes([level]), name=name, message=message)
         found = {**self.figures(), **{key: str(n) for key, n in sorted(self.counts.items())}}

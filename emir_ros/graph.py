@@ -20,16 +20,15 @@ from emir_common.yaml_file import read_map
 from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
-from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS
+from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS, VALVE_LOOPS
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
 CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
-CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_CONTROLLERS}
+CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_LOOPS}
 NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
@@ -38,7 +37,7 @@ EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
 OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby", "autostart")
 ROBOT_FILES = ("robot_file", "machine_file")
-ROBOT_CONTROLLERS = ("cascade",)
+ROBOT_CONTROLLERS = ("cascade", "pfc")
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,8 @@ class Plan:
     def nodes(self) -> tuple[str, ...]:
         """Return the names of the run's nodes, the plant last."""
         loops = dict.fromkeys(node for name in self.controllers for node in CONTROLLERS[name])
-        selector = ("selector_node",) if self.switches else ()
-        return ("recorder_node", *loops, *selector, "plant_node")
+        selector = ("selector_node", "force_loop_node") if self.switches else ()
+        return ("recorder_node", *dict.fromkeys((*loops, *selector)), "plant_node")
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -87,11 +86,7 @@ class Plan:
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
     _check_model(plan)
-    for name in plan.controllers:
-        if name in VALVE_CONTROLLERS and plan.switches:
-            raise ParameterError(f"controller {name!r}: cannot be switched to or from")
-    if plan.controller not in VALVE_CONTROLLERS:
-        Selector(plan.controllers, _from_the_start(plan))
+    Selector(plan.controllers, _from_the_start(plan))
     if not re.fullmatch(r"([A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", plan.namespace, re.ASCII):
         raise ParameterError(
             f"namespace {plan.namespace!r}: letters, digits and _, not a digit first"
@@ -113,6 +108,8 @@ def _check_model(plan: Plan) -> None:
         raise ParameterError(f"model {plan.model!r}: there are {', '.join(MODELS)}")
     if plan.model == ROBOT:
         require_pinocchio()
+        if plan.switches:
+            raise ParameterError("switching: the whole robot keeps one controller")
     known = ROBOT_CONTROLLERS if plan.model == ROBOT else tuple(CONTROLLERS)
     for name in plan.controllers:
         if name not in known:
@@ -141,18 +138,23 @@ def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
 
 
 def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
-    """Return how long the robot's trajectory takes, s, from where it is to start."""
+    """Return how long the robot's trajectory takes, s, from where and with what it is to start."""
+    own = {k: v for k, v in given.get(EVERY_NODE, {}).items() if k in ROBOT_FILES} | own
     files = (Path(name) if name else None for name in (own.pop(key, "") for key in ROBOT_FILES))
     sheet = robot(*files)
+    plant = given.get("plant_node", {})
     path = path_parameters(sheet)
+    if own.get("weigh", path.weigh):
+        load = plant.get("geometry.payload", sheet.main.geometry.payload)
+        load += plant.get("effects.payload.mass", sheet.main.effects.payload.mass)
+        path = with_values(path, {"arm.payload": float(load)})
+    path = with_values(path, {"supply": float(plant.get("supply.p0", path.supply))})
     of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
     move = with_values(TrajectoryParameters(), own)
     planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
     front = "initial_angles."
     angles = {
-        name.removeprefix(front): value
-        for name, value in given.get("plant_node", {}).items()
-        if name.startswith(front)
+        name.removeprefix(front): value for name, value in plant.items() if name.startswith(front)
     }
     start = RobotTrajectoryInputs(with_values(Posture(), angles).angles)
     return planned.initial(start).timing.duration
@@ -209,7 +211,7 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
     nodes: dict[str, dict[str, Any]] = {
         EVERY_NODE: {"lockstep": plan.lockstep, "model": plan.model},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
-        "trajectory_node": {"trajectory": plan.trajectory},
+        "trajectory_node": _trajectory_parameters(plan),
         "recorder_node": {
             "bag": str(plan.bag),
             "description": json.dumps(_description(plan)),
@@ -220,10 +222,21 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
     if plan.switches:
         nodes["selector_node"] = _selector_parameters(plan)
         nodes |= {f"{name}_node": {"standby": True} for name in plan.controllers}
+        nodes["force_loop_node"] = {"standby": not set(VALVE_LOOPS).isdisjoint(plan.controllers)}
     return {
         node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
         for node, values in nodes.items()
     }
+
+
+def _trajectory_parameters(plan: Plan) -> dict[str, Any]:
+    """Return the trajectory's name and, if another than the sheet's, the robot's pump pressure."""
+    given = read_parameters(plan.params)
+    pressure = given.get("plant_node", {}).get("supply.p0")
+    if plan.model != ROBOT or pressure is None:
+        return {"trajectory": plan.trajectory}
+    supply = given.get("trajectory_node", {}).get("supply", pressure)
+    return {"trajectory": plan.trajectory, "supply": float(supply)}
 
 
 def _from_the_start(plan: Plan) -> list[Switch]:

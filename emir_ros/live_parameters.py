@@ -1,14 +1,17 @@
 """Parameters that may be set while a node runs: checked as at its start, in force at a tick."""
 
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from emir_analysis.recorded_orders import SET
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
+
+if TYPE_CHECKING:
+    from emir_ros.shell import ControlNode
 
 
 class LiveParameters:
@@ -19,9 +22,13 @@ class LiveParameters:
     """
 
     def __init__(
-        self, node: Node, tree: Any, live: Collection[str], apply: Callable[[Any], None]
+        self,
+        node: "ControlNode",
+        tree: Any,
+        live: Collection[str],
+        apply: Callable[[Any], None],
     ) -> None:
-        self._tree, self._apply = tree, apply
+        self._node, self._tree, self._apply = node, tree, apply
         self._paths = {path for path in declared(tree) if is_live(path, live)}
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._take)
@@ -34,13 +41,17 @@ class LiveParameters:
         return SetParametersResult(successful=True)
 
     def _take(self, parameters: list[Parameter]) -> None:
-        if any(parameter.name in self._paths for parameter in parameters):
+        values = self._mine(parameters)
+        if values:
             self._tree = self._changed(parameters)
             self._apply(self._tree)
+            self._node.orders.tell(SET, values)
 
     def _changed(self, parameters: list[Parameter]) -> Any:
-        values = {p.name: p.value for p in parameters if p.name in self._paths}
-        return with_values(self._tree, values)
+        return with_values(self._tree, self._mine(parameters))
+
+    def _mine(self, parameters: list[Parameter]) -> dict[str, Any]:
+        return {p.name: p.value for p in parameters if p.name in self._paths}
 
 
 def is_live(path: str, live: Collection[str]) -> bool:

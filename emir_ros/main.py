@@ -1,7 +1,9 @@
 """How a node runs as a process of its own, and how it ends."""
 
+import gc
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -17,8 +19,11 @@ from emir_ros.shell import NodeError, Shell
 
 try:
     from rclpy.experimental import EventsExecutor
-except ImportError:  # an older Jazzy: everything works, lock step is slower
+except ImportError:  # an older Jazzy: everything works, but slower
     EventsExecutor = SingleThreadedExecutor
+
+QUIET = 0.2  # s without a message, after which all that was sent counts as received
+LONGEST_REST = 5.0  # s that is waited for that
 
 
 class StopRequest:
@@ -43,16 +48,38 @@ def start_ros() -> StopRequest:
 
 
 @contextmanager
-def make_executor(*, lockstep: bool) -> Iterator[Any]:
-    """Give the executor to spin with `spin_once`: lock step takes the faster, newer one.
+def make_executor() -> Iterator[Any]:
+    """Give the executor to spin with `spin_once`: the newer one, which has less to do per message.
 
     It is shut down before the nodes and the context are: left over, it may complain at exit.
     """
-    executor: Any = EventsExecutor() if lockstep else SingleThreadedExecutor()
+    executor: Any = EventsExecutor()
     try:
         yield executor
     finally:
         executor.shutdown()
+
+
+def keep_out_of_garbage_collection() -> None:
+    """Let the collector pass over what stands when the run begins, for good.
+
+    Going through all of that (libraries, nodes) takes longer than a control period.
+    """
+    gc.collect()
+    gc.freeze()
+
+
+def take_the_rest(executor: Any, *nodes: Shell) -> None:
+    """Let nodes that hear everybody take what has arrived, until nothing more comes."""
+    hearing = [node for node in nodes if node.hears_everybody]
+    if not hearing:
+        return
+    heard, end = -1, time.monotonic() + LONGEST_REST
+    while time.monotonic() < end and sum(node.heard for node in hearing) > heard:
+        heard = sum(node.heard for node in hearing)
+        quiet = time.monotonic() + QUIET
+        while time.monotonic() < quiet:
+            executor.spin_once(timeout_sec=QUIET)
 
 
 def run(node_class: Callable[[], Shell]) -> None:
@@ -68,11 +95,13 @@ def _run(node_class: Callable[[], Shell]) -> int:
     try:
         stop = start_ros()
         node = node_class()
-        with make_executor(lockstep=node.lockstep) as executor:
+        with make_executor() as executor:
             executor.add_node(node)
+            keep_out_of_garbage_collection()
             while not (stop.made or node.done):
                 executor.spin_once(timeout_sec=0.1)
                 node.check()
+            take_the_rest(executor, node)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
     except (ParameterError, NodeError, SimulationError) as error:

@@ -1,11 +1,12 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
@@ -34,9 +35,26 @@ def declare_tree(node: Node, tree: Tree, without: str = "", live: Collection[str
         if value != default:
             values[path] = value
     try:
-        return with_values(tree, values)
+        result = with_values(tree, values)
     except ParameterError as error:
         raise ParameterError(f"{node.get_name()}: {error}") from None
+    for path, (about, default) in declared(tree).items():
+        _tell_range(node, path.removeprefix(without), about, default)
+    return result
+
+
+def _tell_range(node: Node, name: str, about: Quantity, default: Any) -> None:
+    """Put a quantity's range into its parameter's descriptor, where tools look for it.
+
+    Not when it is declared: rclpy would then refuse a value before we can say its unit.
+    """
+    descriptor = node.describe_parameter(name)
+    if type(default) is float:
+        span = FloatingPointRange(from_value=about.low, to_value=about.high, step=0.0)
+        descriptor.floating_point_range = [span]
+    elif type(default) is int:
+        low, high = math.ceil(about.low), math.floor(about.high)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
 
 
 def declare_robot(node: Node) -> Robot:
@@ -100,7 +118,19 @@ def reject_unknown(node: Node) -> None:
         if of_a_topic and node.get_parameter("lockstep").value:
             raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
         if not of_a_topic:  # of a topic that another node has
-            raise ParameterError(f"{node.get_name()}: {name}: there is no such parameter")
+            raise ParameterError(
+                f"{node.get_name()}: {name}: there is no such parameter;"
+                f" there are {', '.join(_known_beside(node, name))}"
+            )
+
+
+def _known_beside(node: Node, name: str) -> list[str]:
+    """Return what the node has where an unknown dotted name leaves the known ones."""
+    words = name.split(".")[:-1]
+    while words and not node.get_parameters_by_prefix(".".join(words)):
+        words.pop()
+    known = node.get_parameters_by_prefix(".".join(words))
+    return sorted({path.partition(".")[0] for path in known})
 
 
 def describe(about: Quantity) -> str:

@@ -21,7 +21,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
-from emir_ros.wire import Wire, stamp_ns
+from emir_ros.wire import Wire, clock_message, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -115,10 +115,8 @@ class PlantNode(Shell):
         self._publish_tick()
 
     def _publish_tick(self) -> None:
-        stamp = self.tick * PLANT_PERIOD_NS
-        clock = ClockMessage()
-        clock.clock.sec, clock.clock.nanosec = divmod(stamp, conversions.NANOSECONDS)
-        self._clock_publisher.publish(clock)
+        self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
+        self._clock_publisher.publish(clock_message(stamp))
         self._publish_sensors(stamp)
 
     def _on_recorded(self, message: Header) -> None:
@@ -158,11 +156,19 @@ class PlantNode(Shell):
 
     def _start_realtime(self) -> None:
         self._command_received = -math.inf
-        self._started = time.monotonic()
         self._beat = Beat(PLANT_PERIOD_NS * 1e-9)
         self.diagnostics.figures = self._figures
+        self._compile()
         self._publish_sensors(self.get_clock().now().nanoseconds)
+        self._started = time.monotonic()
         self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
+
+    def _compile(self) -> None:
+        """Take a step that does not count: the very first compiles the machine, for seconds."""
+        machine = self.machine
+        state, truth = machine.state, machine.truth
+        machine.step(self._shut, PLANT_PERIOD_NS * 1e-9)
+        machine.state, machine.truth = state, truth
 
     def _figures(self) -> dict[str, str]:
         return self._beat.values() | pressures(self.machine.signals(self.tick))

@@ -19,7 +19,9 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Header, String
 
-from emir_analysis.info import CHANGE, PARAMETERS, Change
+from emir_analysis import parameter_files
+from emir_analysis.info import CHANGE, MACHINE, PARAMETERS, Change
+from emir_analysis.machine_record import PLANT, machine_record
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
@@ -40,22 +42,26 @@ from emir_msgs_py.topics import (
     by_name,
 )
 from emir_ros import qos
+from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
+from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
-from emir_ros.wire import stamp_ns
+from emir_ros.wire import header_message, stamp_ns
 
-PLANT = "plant_node"  # tells the robot description
 EVENTS = 1000  # depth, as ROS has it for parameter events
+QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
 
 
 class RecorderNode(Shell):
     """Every topic of the table (or those named) -> recording, recorder/recorded."""
+
+    hears_everybody = True
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("recorder_node", [], arguments, [])
@@ -75,6 +81,8 @@ class RecorderNode(Shell):
         self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._failed = False
         self.changes = 0  # of parameters, recorded
+        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
+        self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
         self._pending: dict[int, dict[str, bytes]] = {}
         self._next = 0
         for topic in self._topics:
@@ -85,7 +93,6 @@ class RecorderNode(Shell):
         if not self._described:
             self._record_of_parameters = ParameterRecord(self, nodes, self._on_answers)
         self.create_subscription(String, DESCRIPTION, self._on_shape, qos.latched())
-        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
         self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
@@ -119,6 +126,7 @@ class RecorderNode(Shell):
             return
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
+        self._events.write_all()
         with self._watched():
             self._writer.close()
 
@@ -128,12 +136,17 @@ class RecorderNode(Shell):
         try:
             yield
         except WriteError as error:
-            self._failed = True
-            raise NodeError(f"recorder_node: {error}") from None
+            raise self._given_up(error) from None
+
+    def _given_up(self, error: WriteError) -> NodeError:
+        self._failed = True
+        return NodeError(f"recorder_node: {error}")
 
     def _write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        with self._watched():
+        try:
             self._writer.write(topic, data, log_time, publish_time)
+        except WriteError as error:
+            raise self._given_up(error) from None
 
     def _flush(self) -> None:
         with self._watched():
@@ -146,14 +159,15 @@ class RecorderNode(Shell):
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
         self._writer.add_topic(full_name, schema(topic.type), about)
 
-        def receive(data: bytes) -> None:
-            stamp = stamp_ns(data)
-            if self.lockstep:
-                self._on_stamp(topic, stamp, data)
-            else:
-                self._write(full_name, data, self.get_clock().now().nanoseconds, stamp)
+        def receive_by_stamp(data: bytes) -> None:
+            self._on_stamp(topic, stamp_ns(data), data)
 
-        self.hear(topic, receive, profile)
+        def receive_by_clock(data: bytes) -> None:
+            self.heard += 1
+            self._write(full_name, data, self.now_ns(), stamp_ns(data))
+
+        profile.depth = QUEUE
+        self.hear(topic, receive_by_stamp if self.lockstep else receive_by_clock, profile)
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data
@@ -163,9 +177,10 @@ class RecorderNode(Shell):
         while self._described and self._is_complete(self._next):
             self._write_stamp(self._next)
             if self._next % FLUSH_PERIOD_NS == 0:
+                self._events.write_until(self._next - FLUSH_PERIOD_NS)
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
-                self._report(self._next)
+                self._ack.publish(header_message(self._next))
             self._next += PLANT_PERIOD_NS
 
     def _is_complete(self, stamp: int) -> bool:
@@ -198,10 +213,22 @@ class RecorderNode(Shell):
         if not self._answers or self._shape is None:
             return
         self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+        machine = machine_record(self._answers.get(PLANT, {}))
+        if machine:
+            self._writer.add_metadata(MACHINE, machine)
+        for name, values in self._answers.items():
+            self._attach_files(name, values)
         if self._shape:
             self._attach_shape()
         self._described = True
         self._write_complete_stamps()
+
+    def _attach_files(self, node: str, values: dict[str, Any]) -> None:
+        try:
+            for attachment in parameter_files.attachments(node, values):
+                self._writer.add_attachment(attachment)
+        except ParameterError as error:
+            self.diagnostics.say(Level.WARN, f"not in the recording: {error}")
 
     def _attach_shape(self) -> None:
         data = (self._shape or "").encode()
@@ -211,17 +238,12 @@ class RecorderNode(Shell):
         """Store what was set at a node while it runs, with the recording's own time."""
         if self._nodes and event.node not in self._nodes:
             return
-        time = self._next if self.lockstep else self.get_clock().now().nanoseconds
+        time = self._next if self.lockstep else self.now_ns()
         for parameter in event.changed_parameters:
             value = parameter_value_to_python(parameter.value)
             change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
             self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
             self.changes += 1
-
-    def _report(self, stamp: int) -> None:
-        message: Any = Header()
-        message.stamp.sec, message.stamp.nanosec = divmod(stamp, conversions.NANOSECONDS)
-        self._ack.publish(message)
 
 
 def _known(name: str, table: tuple[Topic, ...]) -> Topic:

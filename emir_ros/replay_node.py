@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mcap.records import Channel, Message, Schema
+from mcap.records import Channel, Schema
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -106,7 +106,7 @@ class ReplayNode(Shell):
                 elif isinstance(record, Channel) and record.topic in chosen:
                     channels[record.id] = record.topic
                     self._announce(record, schemas[record.schema_id].name)
-                elif isinstance(record, Message) and record.channel_id in channels:
+                elif isinstance(record, bags.Raw) and record.channel_id in channels:
                     yield Recorded(channels[record.channel_id], record.log_time, record.data)
 
     def _announce(self, channel: Channel, type_name: str) -> None:

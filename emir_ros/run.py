@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -20,7 +19,12 @@ from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
-from emir_ros.main import make_executor, start_ros
+from emir_ros.main import (
+    keep_out_of_garbage_collection,
+    make_executor,
+    start_ros,
+    take_the_rest,
+)
 from emir_ros.shell import NodeError, Shell
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
@@ -106,18 +110,19 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
     stop = start_ros()
     nodes: dict[str, Shell] = {}
     try:
-        with make_executor(lockstep=plan.lockstep) as executor:
+        with make_executor() as executor:
             for name in plan.nodes:
                 nodes[name] = _node_class(name)(ros)
                 executor.add_node(nodes[name])
             plant = nodes["plant_node"]
+            keep_out_of_garbage_collection()
             while not plant.done:
                 if stop.made:
                     raise KeyboardInterrupt
                 executor.spin_once(timeout_sec=0.1)
                 for node in nodes.values():
                     node.check()
-            _receive_the_rest(executor)
+            take_the_rest(executor, *nodes.values())
     finally:
         for node in nodes.values():
             node.close()
@@ -129,13 +134,6 @@ def _node_class(name: str) -> Callable[[list[str]], Shell]:
     module = import_module(f"emir_ros.{name}")
     kind: Callable[[list[str]], Shell] = getattr(module, name.title().replace("_", ""))
     return kind
-
-
-def _receive_the_rest(executor: Any) -> None:
-    """Give the recorder what the plant published last; lock step has waited for that already."""
-    end = time.monotonic() + 0.2
-    while time.monotonic() < end:
-        executor.spin_once(timeout_sec=0.05)
 
 
 def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:

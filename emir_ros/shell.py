@@ -27,6 +27,7 @@ from emir_msgs_py.topics import (
     PLANT_PERIOD_NS,
     ROBOT,
     SELECTOR_TERMS,
+    VALVE_COMMAND,
     VELOCITY_COMMAND,
     Topic,
 )
@@ -34,6 +35,7 @@ from emir_plant.plant import SimulationError
 from emir_ros import qos
 from emir_ros.diagnostics import Beat, Diagnostics, Level
 from emir_ros.node_parameters import declare
+from emir_ros.orders import Orders
 from emir_ros.wire import Wire, stamp_ns
 
 if TYPE_CHECKING:
@@ -58,6 +60,9 @@ class Shell(LifecycleNode):
     ParameterError for a model that the node does not know.
     """
 
+    hears_everybody = False  # and shall take what has arrived before it ends
+    heard = 0  # messages so far, of such a node
+
     def __init__(
         self,
         name: str,
@@ -75,7 +80,8 @@ class Shell(LifecycleNode):
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
         self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
-        self.diagnostics = Diagnostics(self, repeat=not self.lockstep)
+        self.last_stamp = -1  # ns, of the latest step in lock step
+        self.diagnostics = Diagnostics(self, self.now_ns, lockstep=self.lockstep)
         self._offer(known[self.model])
         if declare(self, "autostart", True, "active from the start; else by its services"):
             self.trigger_configure()
@@ -115,7 +121,7 @@ class Shell(LifecycleNode):
 
         def take(data: bytes) -> None:
             if self.active:
-                receive(data)
+                self._keep_failure(receive, data)
 
         def late(_: Any) -> None:
             self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
@@ -129,7 +135,7 @@ class Shell(LifecycleNode):
                 self.diagnostics.counts[f"{topic.name}: publisher lost"] += 1
 
         events = SubscriptionEventCallbacks(deadline=late, liveliness=alive, matched=matched)
-        return self.create_subscription(
+        return super().create_subscription(
             conversions.message_class(topic.type),
             topic.name,
             take,
@@ -196,6 +202,18 @@ class Shell(LifecycleNode):
             return self.get_clock().now().nanoseconds * 1e-9
         return time.monotonic()
 
+    def now_ns(self) -> int:
+        """Return the time of the node's clock, in lock step the stamp of its latest step, ns.
+
+        The computer's own time is asked directly: rclpy makes objects of it, which takes longer
+        than all else that is done with a message.
+        """
+        if self.lockstep:
+            return max(self.last_stamp, 0)
+        if self.get_parameter("use_sim_time").value:
+            return int(self.get_clock().now().nanoseconds)
+        return time.time_ns()
+
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
 
@@ -253,7 +271,6 @@ class ControlNode(Shell):
         self._timeout = Duration(seconds=declare(self, "input_timeout", self.timeout, about))
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
-        self._last_stamp = -1
         for topic in inputs:
             self.take(topic)
         if self._own in OFFERED_COMMANDS:
@@ -263,6 +280,7 @@ class ControlNode(Shell):
                 outputs = [self._offered(topic) for topic in outputs]
                 self._hear_selector()
         self._offer(outputs)
+        self.orders = Orders(self)
         if not self.lockstep:
             self._beat = Beat(self._period * 1e-9)
             self._shown: Signals = {}
@@ -281,12 +299,20 @@ class ControlNode(Shell):
         return Ready(self._own, control) if self._standby else control
 
     def _offered(self, topic: Topic) -> Topic:
-        return OFFERED_COMMANDS[self._own] if topic is VELOCITY_COMMAND else topic
+        commands = VELOCITY_COMMAND, VALVE_COMMAND
+        return OFFERED_COMMANDS[self._own] if topic in commands else topic
 
     def _hear_selector(self) -> None:
         """Take what was applied in the last period as an input; in the first there is none."""
         self._pending[0] = {SELECTOR_TERMS.name: {}}
         self.take(SELECTOR_TERMS, CONTROL_PERIOD_NS)
+
+    @property
+    def next_stamp(self) -> int:
+        """Return from when on an order is in force that comes now: the next period, ns."""
+        if not self.lockstep:
+            return self.now_ns()
+        return self.last_stamp + self._period if self.last_stamp >= 0 else 0
 
     def control(self, signals: Signals, dt: float) -> Signals:
         """Return the output signals of one control period of dt, s."""
@@ -311,17 +337,20 @@ class ControlNode(Shell):
         self._inputs[topic.name] = topic
         wire = Wire(topic)
 
-        def receive(data: bytes) -> None:
-            if not self.lockstep:
-                self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
-            elif stamp_ns(data) % self._period == 0:
-                self._on_stamp(topic, stamp_ns(data) + later, wire.decode(data))
+        def receive_latest(data: bytes) -> None:
+            self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
 
+        def receive_all(data: bytes) -> None:
+            stamp = stamp_ns(data)
+            if stamp % self._period == 0:
+                self._on_stamp(topic, stamp + later, wire.decode(data))
+
+        receive = receive_all if self.lockstep else receive_latest
         self.hear(topic, receive, qos.requested(topic, lockstep=self.lockstep))
 
     def _on_stamp(self, topic: Topic, stamp: int, signals: Signals) -> None:
         complete = self._pending.setdefault(stamp, {})
-        if topic.name in complete or stamp <= self._last_stamp:
+        if topic.name in complete or stamp <= self.last_stamp:
             raise NodeError(
                 f"{self.get_name()}: {topic.name} came twice for t = {stamp * 1e-9:.3f} s:"
                 " does more than one node publish it?"
@@ -329,7 +358,7 @@ class ControlNode(Shell):
         complete[topic.name] = signals
         if len(complete) == self._expected(stamp):
             del self._pending[stamp]
-            self._last_stamp = stamp
+            self.last_stamp = stamp
             self._held |= complete
             self._run(stamp, self._held.values())
 
@@ -392,7 +421,12 @@ class ControlNode(Shell):
                 Level.ERROR, f"{self.consequence}: {', '.join(bad)} {verb} not a number"
             )
         else:
-            self.diagnostics.say(Level.OK, self.status())
+            caution = self.caution(outputs)
+            self.diagnostics.say(Level.WARN if caution else Level.OK, caution or self.status())
+
+    def caution(self, outputs: Signals) -> str:
+        """Return why the outputs are not what was asked for, if they are not."""
+        return ""
 
     def status(self) -> str:
         """Return what there is to say while all is well."""

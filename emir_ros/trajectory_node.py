@@ -13,6 +13,7 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from emir_analysis.node_controls import Guidable, TrajectoryControl
+from emir_analysis.recorded_orders import FOLLOW, as_values
 from emir_analysis.robot_controls import RobotTrajectoryControl
 from emir_analysis.robot_setup import path_parameters, trajectory
 from emir_control.trajectory import TrajectoryParameters, named
@@ -85,6 +86,7 @@ class TrajectoryNode(ControlNode):
         def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
                 response.message, response.success = verb(), True
+                self.orders.tell(verb.__name__, {})
             except WaypointError as error:
                 response.message = str(error)
             return response
@@ -94,10 +96,12 @@ class TrajectoryNode(ControlNode):
     def _on_waypoints(self, message: JointTrajectory) -> None:
         self.waypoints_heard += 1
         try:
-            self._follow(_waypoints(message))
+            points = _waypoints(message)
+            self._follow(points)
         except WaypointError as error:
             self.diagnostics.say(Level.WARN, f"{JOINT_TRAJECTORY} rejected: {error}")
         else:
+            self.orders.tell(FOLLOW, as_values(points))
             self._doing = f"follows {JOINT_TRAJECTORY}"
 
     def _follow(self, points: Waypoints) -> None:

@@ -22,6 +22,9 @@ from emir_msgs_py.topics import Topic
 from emir_ros.message_definitions import definition
 
 STAMP = struct.Struct("<4xiI")  # encapsulation, then the header's sec and nanosec
+_CLOCK = struct.Struct("<4siI")
+_LITTLE_ENDIAN = b"\0\1\0\0"  # CDR's encapsulation
+_NO_FRAME = b"\1\0\0\0\0"  # an empty text: its length with the zero at its end, that zero
 _MARKED_STAMP = 1_234_567_891_123_456_789  # ns
 _MARK = -1.2345678912345678e-123  # times the signal's number
 
@@ -30,6 +33,16 @@ def stamp_ns(data: bytes) -> int:
     """Return the header stamp, ns, of any serialized message that begins with a header."""
     sec, nanosec = STAMP.unpack_from(data)
     return int(sec) * NANOSECONDS + int(nanosec)
+
+
+def clock_message(stamp: int) -> bytes:
+    """Return a serialized rosgraph_msgs/Clock of a time in ns."""
+    return _CLOCK.pack(_LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS))
+
+
+def header_message(stamp: int) -> bytes:
+    """Return a serialized std_msgs/Header, stamped in ns."""
+    return clock_message(stamp) + _NO_FRAME
 
 
 class Wire:
@@ -95,15 +108,19 @@ def _double(value: float) -> bytes:
 
 
 def _serialized(topic: Topic, stamp: int, signals: Mapping[str, float]) -> bytes:
-    """Return the message by way of a file in memory, the serializer's public door."""
+    return as_cdr(topic.type, conversions.message(topic, stamp, signals))
+
+
+def as_cdr(type_name: str, message: Any) -> bytes:
+    """Return a message by way of a file in memory, the serializer's public door."""
     stream = BytesIO()
     writer = Writer(stream)
-    kind = writer.register_msgdef(topic.type, definition(topic.type))
-    writer.write_message(topic.name, kind, conversions.message(topic, stamp, signals))
+    kind = writer.register_msgdef(type_name, definition(type_name))
+    writer.write_message("message", kind, message)
     writer.finish()
     stream.seek(0)
-    ((_, _, message),) = make_reader(stream).iter_messages()
-    return message.data
+    ((_, _, written),) = make_reader(stream).iter_messages()
+    return written.data
 
 
 def _deserialized(topic: Topic, data: bytes) -> Any:

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.outer_loop import Situation
+from emir_analysis.node_controls import Signals
 from emir_control.pfc import PREVIEW, PfcParameters, PfcState
+from emir_msgs_py.topics import CYLINDER_PREVIEW
 
 Array = NDArray[np.float64]
 
@@ -50,9 +51,10 @@ class Problem:
         change = p.acceleration_limit * m.period
         return cls(m.A, m.B, m.C, p.speed_limit, change, m.period)
 
-    def query(self, state: PfcState, now: Situation) -> Query:
+    def query(self, state: PfcState, now: Signals) -> Query:
         """Return the instance that a predictive controller in this state has to solve."""
-        wanted = np.array(now.preview[: self.horizon]) - state.origin - state.errors[-1]
+        preview = [now[name] for name in CYLINDER_PREVIEW.fields]
+        wanted = np.array(preview[: self.horizon]) - state.origin - state.errors[-1]
         return Query(state.model, state.command, wanted)
 
     @property

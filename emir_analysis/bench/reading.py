@@ -1,11 +1,16 @@
-"""Speed of reading a recording, beside other libraries that decode every message of it."""
+"""Speed of reading a recording, beside other libraries that decode every message of it.
+
+Ours twice: as the analysis reads, the numbers of every field that the recording explains as
+columns; and as objects, all of them held.
+"""
 
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
-from emir_analysis import bags
+from emir_analysis import bags, columns
 from emir_analysis.bench.timing import Contender, Figure, rates
+from emir_analysis.info import info
 
 
 def reading_figures(bag: Path, seconds: float) -> list[Figure]:
@@ -15,14 +20,31 @@ def reading_figures(bag: Path, seconds: float) -> list[Figure]:
     def contender(name: str, run: Callable[[Path], None]) -> Contender:
         return Contender(name, lambda: run(bag), messages)
 
-    found = [contender("emir_analysis.bags", _ours), contender("mcap-ros2-support", _mcap)]
+    found = [
+        contender("emir_analysis.columns", _columns(bag)),
+        contender("emir_analysis.bags", _objects),
+        contender("mcap-ros2-support", _mcap),
+    ]
     if find_spec("rosbags") is None:
         missing = [Figure("rosbags", None, "1/s", note="rosbags is not installed")]
         return rates(found, "1/s", seconds) + missing
     return rates([*found, contender("rosbags", _rosbags)], "1/s", seconds)
 
 
-def _ours(bag: Path) -> None:
+def _columns(bag: Path) -> Callable[[Path], None]:
+    explained = {
+        name: [entry["path"] for entry in topic.fields.values()]
+        for name, topic in info(bag).topics.items()
+        if topic.fields
+    }
+
+    def read(bag: Path) -> None:
+        columns.read(bag, explained)
+
+    return read
+
+
+def _objects(bag: Path) -> None:
     bags.read(bag)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from emir_analysis.compare import dynamic_deflection, figures, run
 from emir_analysis.design_pfc import DesignTask, design_pfc
-from emir_analysis.outer_loop import PfcLoop
+from emir_analysis.node_controls import PfcControl
 from emir_common.quantity import ParameterError
 from emir_control.pfc import Pfc
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters
@@ -42,7 +42,7 @@ def before_and_after(stated: Machine, found: Machine) -> dict[str, ControlResult
 
 
 def _on(machine: Machine, model: Machine) -> ControlResult:
-    outer = PfcLoop(Pfc(design_pfc(model, DesignTask())))
+    outer = PfcControl(Pfc(design_pfc(model, DesignTask())))
     signals = run(machine, AwayAndBack(TrajectoryParameters()), outer, ANGLE)
     moves = figures(signals)
     deflection = float(np.max(np.abs(dynamic_deflection(signals))))

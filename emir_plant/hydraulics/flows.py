@@ -4,11 +4,10 @@ Q > 0 flows into a chamber. Conductances 1/sqrt(k) of a path are written as prod
 closed edge or logic block gives 0 instead of dividing by zero.
 """
 
-import math
 from typing import Any, NamedTuple
 
 from emir_plant.hydraulics.orifice import turbulent_flow
-from emir_plant.jit import compiled
+from emir_plant.jit import compiled, square_root
 
 
 class Pressures(NamedTuple):
@@ -26,7 +25,7 @@ def inlet_flow(wanted: float, drop: float, p: Any) -> float:
     wanted: flow, m^3/s, at which the edge alone drops `balance_pressure`; it stands for its size.
     """
     lines = p.k_pump_line + p.k_block_in
-    return turbulent_flow(drop, wanted / math.sqrt(lines * wanted * wanted + p.balance_pressure))
+    return turbulent_flow(drop, wanted / square_root(lines * wanted * wanted + p.balance_pressure))
 
 
 @compiled
@@ -47,7 +46,7 @@ def pump_flow(
 def lifting_flows(opening: float, pressures: Pressures, p: Any) -> tuple[float, float]:
     """Return (Q_H, Q_S), m^3/s, for an opening > 0."""
     inflow = pump_flow(opening, p.flow_nominal, pressures.supply, pressures.lifting, p)
-    conductance = opening / math.sqrt(p.k_meter_out_lifting + p.k_return_line * opening * opening)
+    conductance = opening / square_root(p.k_meter_out_lifting + p.k_return_line * opening * opening)
     return inflow, -turbulent_flow(pressures.lowering - p.pT, conductance)
 
 
@@ -65,7 +64,7 @@ def lowering_flows(
     edge, block = opening * opening, logic * logic
     resistance = p.k_meter_out_lowering * block + p.k_return_line * edge * block
     resistance += p.k_block_out * edge
-    conductance = abs(opening) * logic / math.sqrt(resistance)
+    conductance = abs(opening) * logic / square_root(resistance)
     outflow = turbulent_flow(pressures.lifting - p.pT, conductance)
     if p.balance_lowering == 0.0:
         return -outflow, pump_flow(opening, nominal, supply, pressures.lowering, p)

@@ -59,7 +59,7 @@ class Mechanics:
         return kinematics.tree(self.topology)
 
     @cached_property
-    def _tcp(self) -> tuple[int, Array]:
+    def tcp_place(self) -> tuple[int, Array]:
         """The TCP's joint in `tree` and its place in that joint's frame, (3,), m."""
         model = self.topology.model
         frame = model.frames[model.getFrameId(TCP)]
@@ -138,9 +138,7 @@ class Mechanics:
 
     def tips(self, q: Array) -> tuple[Array, Array]:
         """Return the TCP's position, (2, 3), m, and axes, (2, 3, 3): as it is, and unbent."""
-        t, (joint, place) = self.topology, self._tcp
-        axes, places = kinematics.tips(q, t.independent, t.joints, self.tree, joint)
-        return places + axes @ place, axes
+        return kinematics.tips(q, self.topology.joints, self.tree, self.tcp_place)
 
     def ratios(self, q: Array) -> Array:
         """Return dh/dalpha of joints 1-5, (5,), m."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from emir_plant.jit import compiled
 from emir_plant.robot import actuators, elimination, linkage
 from emir_plant.robot.actuators import ACTUATORS
-from emir_plant.robot.kinematics import Tree
+from emir_plant.robot.kinematics import Deflection, Tree, deflection, tips
 from emir_plant.robot.stiffness import COORDINATES
 
 Array = NDArray[np.float64]
@@ -64,6 +64,22 @@ def drive_motion(q: Array, v: Array, t: Tables, motion: Array) -> None:
         motion[VELOCITY, k] = parts[linkage.LENGTH, 1] * v[joint]
         motion[RATIO, k] = parts[linkage.LENGTH, 1]
         motion[STOP_FORCE, k] = _end_stop(motion[STROKE, k], motion[VELOCITY, k], t.stops[:, k])
+
+
+@compiled
+def shown(state: Array, tcp: tuple[int, Array], t: Tables) -> tuple[Array, Array, Deflection]:
+    """Return of a state the drives' motion, (4, 6), the oil's forces, (6,), N, and the TCP.
+
+    tcp: see `kinematics.tips`.
+    """
+    n = (state.size - actuators.SIZE) // 2
+    oil, q, v = state[: actuators.SIZE], state[actuators.SIZE :][:n], state[actuators.SIZE + n :]
+    motion, force = np.empty((4, ACTUATORS)), np.empty(ACTUATORS)
+    drive_motion(q, v, t, motion)
+    for k in range(ACTUATORS):
+        force[k] = actuators.oil_force(oil, k, t.drives)
+    places, axes = tips(q, t.joints, t.tree, tcp)
+    return motion, force, deflection(places, axes)
 
 
 @compiled

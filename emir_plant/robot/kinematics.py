@@ -144,19 +144,68 @@ def _slide(axes: Array, along: Array, way: float, at: Array, motion: Array) -> N
 
 
 @compiled
-def tips(q: Array, independent: Index, joints: Index, t: Tree, joint: int) -> tuple[Array, Array]:
-    """Return axes, (2, 3, 3), and place, (2, 3), m, of a joint's frame: as it is, and unbent.
+def _follow(q: Array, t: Tree, joint: int, axes: Array, place: Array) -> None:
+    """Write axes, (3, 3), and place, (3,), m, of a joint's frame, down the chain to it alone."""
+    units, motion = np.eye(3), np.empty(3)
+    axes[:], place[:] = units, 0.0
+    at = 0
+    for k in range(joint + 1):
+        if t.drivers[k] != CHAIN:
+            continue
+        for i in range(3):
+            for j in range(3):
+                place[i] += axes[i, j] * t.places[k, j]
+        if t.kinds[k] == TURN:
+            _turn(axes, t.axes[k], q[at])
+            at += 1
+            continue
+        for n in range(3):
+            if t.kinds[k] == SHIFT:
+                _slide(axes, units[n], q[at + n], place, motion)
+            else:
+                _turn(axes, units[2 - n], q[at + n])
+        at += 3
 
-    For a joint of the chain, on which the linkages' coordinates have no influence.
+
+@compiled
+def tips(q: Array, joints: Index, t: Tree, tcp: tuple[int, Array]) -> tuple[Array, Array]:
+    """Return the TCP's place, (2, 3), m, and axes, (2, 3, 3): as it is, and unbent.
+
+    q: (n,). joints: (6,) places in q. tcp: the joint that carries it, and where in its frame,
+    (3,), m. No coordinate of a linkage has an influence.
     """
+    joint, offset = tcp
     axes, places = np.empty((2, 3, 3)), np.empty((2, 3))
-    z = np.zeros(independent.size + np.count_nonzero(t.drivers != CHAIN))
-    for k in range(q.size):
-        z[independent[k]] = q[k]
+    unbent = np.zeros_like(q)
+    for k in joints:
+        unbent[k] = q[k]
+    _follow(q, t, joint, axes[0], places[0])
+    _follow(unbent, t, joint, axes[1], places[1])
     for n in range(2):
-        all_axes, all_places, _ = frames(z, t)
-        axes[n], places[n] = all_axes[joint], all_places[joint]
-        z[:] = 0.0
-        for k in joints:
-            z[independent[k]] = q[k]
-    return axes, places
+        for i in range(3):
+            for j in range(3):
+                places[n, i] += axes[n, i, j] * offset[j]
+    return places, axes
+
+
+class Deflection(NamedTuple):
+    """The TCP, and its deflection from that of the rigid robot with the same joint angles."""
+
+    tcp: Array  # r_6, (3,), m, deflected
+    tcp_axes: Array  # x_6, y_6, z_6 in the columns, (3, 3), deflected
+    position: Array  # deflection of r_6, (3,), m, ground's axes
+    axes: Array  # deflection of x_6, y_6, z_6 in the columns, (3, 3)
+    rotation: Array  # the same as a rotation vector, (3,), rad
+
+
+@compiled
+def deflection(places: Array, axes: Array) -> Deflection:
+    """Return the TCP's deflection, from `tips`."""
+    sine = np.zeros(3)  # small enough for the antisymmetric part to be the rotation vector's sine
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for n in range(3):
+            sine[i] += 0.5 * (axes[0, k, n] * axes[1, j, n] - axes[0, j, n] * axes[1, k, n])
+    size = math.sqrt(sine[0] * sine[0] + sine[1] * sine[1] + sine[2] * sine[2])
+    rotation = sine * (math.asin(min(size, 1.0)) / size if size > 0.0 else 1.0)
+    return Deflection(places[0], axes[0], places[0] - places[1], axes[0] - axes[1], rotation)

@@ -16,7 +16,7 @@ from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY
 from emir_plant.robot.dynamics import Mechanics
 from emir_plant.robot.integration import RATIO, STOP_FORCE, STROKE, VELOCITY, Tables
 from emir_plant.robot.parameters import Robot
-from emir_plant.robot.posture import deflection, rest
+from emir_plant.robot.posture import rest
 from emir_plant.robot.stiffness import cut_damping, cut_stiffness
 
 Array = NDArray[np.float64]
@@ -195,10 +195,7 @@ class RobotPlant:
         n, t = self.mechanics.size, self.tables
         q, v = state[SIZE : SIZE + n], state[SIZE + n :]
         each = state[1:SIZE].reshape(ACTUATORS, EACH)
-        motion, force = np.empty((4, ACTUATORS)), np.empty(ACTUATORS)
-        integration.drive_motion(q, v, t, motion)
-        actuators.forces(state[:SIZE], np.zeros(ACTUATORS), t.drives, force)
-        bent = deflection(self.mechanics, q)
+        motion, force, bent = integration.shown(state, self.mechanics.tcp_place, t)
         return RobotTruth(
             angle=q[t.joints],
             rate=v[t.joints],

@@ -8,22 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from emir_plant.robot import kinematics
 from emir_plant.robot.dynamics import Mechanics
+from emir_plant.robot.kinematics import Deflection
 from emir_plant.robot.reach import PostureError, check
 
 Array = NDArray[np.float64]
 
 SETTLED = 1e-13  # m or rad, change of the deflections from one iteration to the next
-
-
-class Deflection(NamedTuple):
-    """The TCP, and its deflection from that of the rigid robot with the same joint angles."""
-
-    tcp: Array  # r_6, (3,), m, deflected
-    tcp_axes: Array  # x_6, y_6, z_6 in the columns, (3, 3), deflected
-    position: Array  # deflection of r_6, (3,), m, ground's axes
-    axes: Array  # deflection of x_6, y_6, z_6 in the columns, (3, 3)
-    rotation: Array  # the same as a rotation vector, (3,), rad
 
 
 @dataclass(frozen=True)
@@ -82,15 +74,7 @@ def rest(mechanics: Mechanics, joints: Array) -> Rest:
 
 def deflection(mechanics: Mechanics, q: Array) -> Deflection:
     """Return the TCP's deflection at the coordinates q, (n,), moving or not."""
-    (bent, straight), (bent_axes, axes) = mechanics.tips(q)
-    turn = bent_axes @ axes.T
-    # small enough for the antisymmetric part to be the rotation vector's sine
-    sine = 0.5 * np.array(
-        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-    )
-    size = float(np.linalg.norm(sine))
-    rotation = sine * (math.asin(min(size, 1.0)) / size if size > 0.0 else 1.0)
-    return Deflection(bent, bent_axes, bent - straight, bent_axes - axes, rotation)
+    return kinematics.deflection(*mechanics.tips(q))
 
 
 def weight_stiffness(mechanics: Mechanics, q: Array) -> Array:

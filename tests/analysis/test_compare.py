@@ -14,7 +14,7 @@ from emir_analysis.compare import MoveFigures, controllers, figures, run
 from emir_analysis.damping import damping_figures
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.margin import gain_margin, linear_machine
-from emir_analysis.outer_loop import PfcLoop
+from emir_analysis.node_controls import PfcControl
 from emir_control import pfc_file
 from emir_control.design import spectral_radius
 from emir_control.force_loop import ForceLoopParameters
@@ -178,9 +178,13 @@ def test_trade_off_of_conventional_control(
     monkeypatch.setattr(trade_off, "GAINS", (1.0, 2.0))
     monkeypatch.setattr(trade_off, "TIME_CONSTANTS", (0.1, 0.4))
     image = tmp_path / "curve.png"
-    assert main(["compare", "--trade-off", "--picture", str(image)]) == 0
-    rows = [line.strip("|").split("|") for line in capsys.readouterr().out.splitlines()[2:]]
-    by_tuning = {(float(row[0]), float(row[1])): [float(cell) for cell in row[2:]] for row in rows}
+    words = ["compare", "--trade-off", "--controllers", "lqg", "--picture", str(image)]
+    assert main(words) == 0
+    rows = [line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:]]
+    *rows, lqg = rows
+    assert lqg[0].strip() == "lqg"
+    by_tuning = {(float(row[1]), float(row[2])): [float(cell) for cell in row[3:]] for row in rows}
+    assert float(lqg[5]) < min(bent for _, _, bent, _ in by_tuning.values())
     for gain in (1.0, 2.0):
         (quick, _, bent, _), (slow, _, less_bent, _) = by_tuning[gain, 0.1], by_tuning[gain, 0.4]
         assert quick < slow
@@ -194,7 +198,7 @@ def test_gain_margin_is_where_the_poles_cross_the_unit_circle() -> None:
     for payload in (0.0, 1500.0):
         point = OperatingPoint(angle=math.radians(60.0), payload=payload)
         linear = linear_machine(joint1(), point)
-        margin = gain_margin(linear, PfcLoop(law))
+        margin = gain_margin(linear, PfcControl(law))
         for factor, stable in ((0.95 * margin, True), (1.05 * margin, False)):
             louder = replace(linear.model, B=factor * linear.model.B)
             assert (spectral_radius(law, louder) < 1.0) == stable

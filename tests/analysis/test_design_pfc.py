@@ -17,7 +17,7 @@ from emir_analysis.design_pfc import (
     steady_motion,
     velocity_model,
 )
-from emir_analysis.outer_loop import PfcLoop
+from emir_analysis.node_controls import PfcControl
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -117,7 +117,7 @@ def test_stability_is_what_the_nonlinear_machine_shows(
     point = OperatingPoint(angle=angle, payload=payload)
     assert (spectral_radius(law, velocity_model(machine, point, "stroke")) < 1.0) == stable
     trajectory = named("lift-lower", TrajectoryParameters(pause=12.0))
-    run = ClosedLoop(Plant(machine), trajectory, PfcLoop(law)).run(angle, 2e6, 16.3)
+    run = ClosedLoop(Plant(machine), trajectory, PfcControl(law)).run(angle, 2e6, 16.3)
     early, late = (
         np.ptp(run["tcp_deflection"][round(a / 0.008) : round((a + 3.0) / 0.008)])
         for a in (4.3, 13.3)

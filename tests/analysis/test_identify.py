@@ -11,7 +11,7 @@ from emir_analysis.closed_loop import TICKS, ClosedLoop
 from emir_analysis.design_pfc import DesignTask, OperatingPoint, designed, velocity_model
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, identify
-from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop
+from emir_analysis.node_controls import CascadeControl, PfcControl, Stepping
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.design import spectral_radius
@@ -50,9 +50,9 @@ def test_the_model_that_made_the_signals_is_found() -> None:
 
 
 @pytest.mark.parametrize("output", ["stroke", "tip_angle"])
-@pytest.mark.parametrize("outer", [CascadeLoop(), PfcLoop(PLAIN)], ids=["cascade", "pfc"])
+@pytest.mark.parametrize("outer", [CascadeControl(), PfcControl(PLAIN)], ids=["cascade", "pfc"])
 def test_an_ordinary_run_of_the_machine_tells_its_slow_dynamics(
-    outer: OuterLoop, output: str
+    outer: Stepping, output: str
 ) -> None:
     """Sensors as they are, 12 bits and noise; against the machine linearized, order 10 and more."""
     trajectory = named("lift-lower", TrajectoryParameters())

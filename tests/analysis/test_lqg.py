@@ -9,7 +9,7 @@ import pytest
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.compare import Run, dynamic_deflection
 from emir_analysis.machine_model import actuator, lqg_parameters
-from emir_analysis.outer_loop import LqgLoop
+from emir_analysis.node_controls import LqgControl
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import mpc
@@ -26,7 +26,7 @@ FORTY_FIVE = math.radians(45.0)
 
 def _run(machine: Machine, law: Lqg, name: str, angle: float, delay: float, last: float) -> Run:
     trajectory = named(name, TrajectoryParameters(delay=delay, pause=8.0))
-    return ClosedLoop(Plant(machine), trajectory, LqgLoop(law)).run(angle, 2e6, last)
+    return ClosedLoop(Plant(machine), trajectory, LqgControl(law)).run(angle, 2e6, last)
 
 
 @pytest.mark.parametrize("payload", [0.0, 640.0, 1400.0])
@@ -56,7 +56,7 @@ def _spectral_radius(law: Regulator, real: Regulator, stiffness: float) -> float
         x, u_past, estimate = np.split(unit, (m, m + past))
         measured = real.C[:, :m] @ x
         measured[2] *= stiffness
-        estimate = estimate + law.kalman @ (measured - law.C @ estimate)
+        estimate = estimate + law.moving.gain @ (measured - law.C @ estimate)
         off = np.append(estimate[: law.controlled], u_past + estimate[law.flow])
         off[law.controlled - 1] -= estimate[law.force]
         u = -estimate[law.flow] - law.feedback @ off

@@ -9,24 +9,36 @@ import numpy as np
 import pytest
 
 from emir_analysis.closed_loop import PERIOD, ClosedLoop
-from emir_analysis.outer_loop import CascadeLoop, OuterLoop, PfcLoop, PfcTipLoop, Situation
+from emir_analysis.machine_model import lqg_parameters
+from emir_analysis.node_controls import (
+    CascadeControl,
+    LqgControl,
+    PfcControl,
+    PfcTipControl,
+    Signals,
+    Stepping,
+    situation,
+)
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.limits import LimitParameters, off_the_ends
+from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
-from emir_control.trajectory import Reference, TrajectoryParameters, named
+from emir_control.trajectory import NO_MOVE, Reference, TrajectoryParameters, named
+from emir_msgs_py.topics import CYLINDER_REFERENCE
 from emir_plant import linkage
 from emir_plant.plant import Plant
+from emir_plant.sensors import Measurement
 from emir_plant.sheet import joint1
 
 LIMITS = LimitParameters()
 HOLD = named("hold", TrajectoryParameters())
-LOOPS: dict[str, Callable[[], OuterLoop]] = {
-    "cascade": CascadeLoop,
-    "pfc": lambda: PfcLoop(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
-    "pfc_tip": lambda: PfcTipLoop(
+LOOPS: dict[str, Callable[[], Stepping]] = {
+    "cascade": CascadeControl,
+    "pfc": lambda: PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+    "pfc_tip": lambda: PfcTipControl(
         Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
     ),
 }
@@ -38,8 +50,8 @@ class Commanding:
 
     command: Callable[[int], float]
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
-        """Return the command; see `OuterLoop`."""
+    def step(self, state: Any, now: Signals, dt: float) -> tuple[Any, dict[str, float]]:
+        """Return the command; see `Stepping`."""
         k = state or 0
         return k + 1, {"velocity_command": self.command(k)}
 
@@ -48,14 +60,14 @@ class Commanding:
 class Blind:
     """Another outer loop, whose measurements are not a number for a while; notes its commands."""
 
-    outer: OuterLoop
+    outer: Stepping
     periods: range
 
-    def step(self, state: Any, now: Situation, dt: float) -> tuple[Any, dict[str, float]]:
-        """Return what the other one makes of it; see `OuterLoop`."""
+    def step(self, state: Any, now: Signals, dt: float) -> tuple[Any, dict[str, float]]:
+        """Return what the other one makes of it; see `Stepping`."""
         k, inner = state or (0, None)
         if k in self.periods:
-            now = now._replace(reading=now.reading._make([math.nan] * 6))
+            now = now | dict.fromkeys(Measurement._fields, math.nan)
         inner, signals = self.outer.step(inner, now, dt)
         return (k + 1, inner), signals
 
@@ -126,11 +138,11 @@ def test_a_controller_begun_without_a_number_begins_with_the_first(name: str, lo
 
     state = plant.initial(math.radians(45.0), 2e6)
     reading = measure(plant, plant.outputs(state), 0, state)
-    good = Situation(Reference(reading.stroke, 0.0), (reading.stroke,) * 20, reading)
+    good = situation(Reference(reading.stroke, 0.0), (reading.stroke,) * 20, reading)
     bad = (
-        good._replace(reading=reading._make([math.nan] * 6))
+        good | dict.fromkeys(Measurement._fields, math.nan)
         if lost == "stroke"
-        else good._replace(reference=Reference(math.nan, math.nan))
+        else good | dict.fromkeys(CYLINDER_REFERENCE.fields, math.nan)
     )
     control, signals = outer.step(None, bad, PERIOD)
     assert signals["velocity_command"] == 0.0
@@ -148,3 +160,40 @@ def test_the_limits_are_the_machines_stroke() -> None:
 def test_limits_that_leave_no_stroke_are_refused() -> None:
     with pytest.raises(ParameterError, match="leaves nothing above stroke_low"):
         LimitParameters(stroke_low=0.5, stroke_high=0.51)
+
+
+@pytest.mark.parametrize(("degrees", "name"), [(74.0, "lift-lower"), (8.0, "lower-lift")])
+def test_a_plan_that_would_end_at_the_end_of_the_stroke_ends_at_the_margin(
+    degrees: float, name: str
+) -> None:
+    """LQG plans what is left of the move, says that it does, and comes back."""
+    trajectory = named(name, TrajectoryParameters(distance=0.2, speed=0.03, pause=4.0))
+    outer = LqgControl(Lqg(lqg_parameters(joint1())))
+    run = ClosedLoop(Plant(joint1()), trajectory, outer).run(
+        math.radians(degrees), 2e6, trajectory.duration
+    )
+    lifting = name == "lift-lower"
+    line = LIMITS.stroke_high - LIMITS.end_margin if lifting else LIMITS.end_margin
+    stroke, reference = run["true_stroke"], run["reference_stroke"]
+    beyond = reference.max() - line if lifting else line - reference.min()
+    assert beyond > 0.03
+    assert (stroke.max() if lifting else stroke.min()) == pytest.approx(line, abs=5e-3)
+    assert stroke[-1] == pytest.approx(stroke[0], abs=1e-2)
+    limited = run["lqg_limited"]
+    assert limited.max() == 1.0
+    assert limited[:10].max() == 0.0
+
+
+def test_lqg_is_held_off_the_end_whatever_it_wants() -> None:
+    """Its force at rest says less than there is: it would drive the piston on."""
+    law = Lqg(lqg_parameters(joint1()))
+    plant = Plant(joint1())
+    state = plant.initial(math.radians(85.0), 2e6)
+    from emir_plant.sensors import measure
+
+    reading = measure(plant, plant.outputs(state), 0, state)
+    inputs = LqgInputs(reading.stroke, NO_MOVE, *reading[:1], *reading[2:4], reading.deflection)
+    held = law.initial(inputs)
+    angle = linkage.angle(LIMITS.stroke_high, plant.record[0])
+    _, outputs = law.step(held, inputs._replace(reference=2.0, angle=angle), PERIOD)
+    assert outputs.wanted <= 0.0

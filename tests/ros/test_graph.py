@@ -23,10 +23,15 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.info import info, parameters_text
+from emir_analysis.info import info, parameters_text, text
 from emir_analysis.machine_model import lqg_parameters
-from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
-from emir_analysis.outer_loop import CascadeLoop, LqgLoop, PfcLoop, PfcTipLoop
+from emir_analysis.node_controls import (
+    CascadeControl,
+    LqgControl,
+    MpcControl,
+    PfcControl,
+    PfcTipControl,
+)
 from emir_analysis.recover import recover
 from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
@@ -41,7 +46,13 @@ from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py import conversions
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, TOPICS, by_name
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    DIAGNOSTICS,
+    PLANT_PERIOD_NS,
+    TOPICS,
+    by_name,
+)
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
@@ -59,22 +70,25 @@ NODES = set(Plan(bag=Path()).nodes) - {"recorder_node"}
 def _loop_signals(controller: str) -> dict[str, np.ndarray]:
     """What the plain loop gives, without ROS."""
     outer = {
-        "cascade": CascadeLoop,
-        "pfc": lambda: PfcLoop(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
-        "pfc_tip": lambda: PfcTipLoop(
+        "cascade": CascadeControl,
+        "pfc": lambda: PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+        "pfc_tip": lambda: PfcTipControl(
             Tip(Pfc(pfc_file.load(pfc_file.default_file(TIP_ANGLE), TIP_ANGLE)))
         ),
-        "lqg": lambda: LqgLoop(Lqg(lqg_parameters(joint1()))),
-        "mpc": lambda: LqgLoop(Mpc(lqg_parameters(joint1())), "mpc"),
+        "lqg": lambda: LqgControl(Lqg(lqg_parameters(joint1()))),
+        "mpc": lambda: MpcControl(Mpc(lqg_parameters(joint1()))),
     }[controller]()
     trajectory = named("lift-lower", TrajectoryParameters())
     return ClosedLoop(Plant(joint1()), trajectory, outer).run(math.pi / 4, 2e6, DURATION)
 
 
 def _read_with_rosbags(bag: Path) -> dict[str, list[tuple[int, object]]]:
+    """The topics of the table, decoded."""
     found: dict[str, list[tuple[int, object]]] = {}
     with AnyReader([bag]) as reader:
         for connection, log_time, data in reader.messages():
+            if connection.topic == DIAGNOSTICS:
+                continue
             message = reader.deserialize(data, connection.msgtype)
             found.setdefault(connection.topic, []).append((log_time, message))
     return found
@@ -152,7 +166,35 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
                 for _, message in recorded[f"/{topic.name}"]
             ]
             assert np.array_equal(values, expected[name]), name
-    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop"):
+    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "selector", "force_loop"):
+        assert same(replay(bag, node, {})), node
+
+
+def test_switching_by_way_of_lqg_in_lock_step_equals_the_plain_loop(tmp_path: Path) -> None:
+    """LQG begins, PFC goes on while it lifts: the force loop hands on, then damps."""
+    bag = tmp_path / "run"
+    words = ["--controller", "lqg", "--switch", "2.5=pfc", "--duration", "3.2"]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    controls = {
+        "lqg": LqgControl(Lqg(lqg_parameters(joint1()))),
+        "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+    }
+    switches = (Switch(0.0, "lqg"), Switch(2.5, "pfc"))
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
+    expected = loop.run(math.pi / 4, 2e6, 3.2)
+    recorded = _read_with_rosbags(bag)
+    plan = Plan(bag=bag, controller="lqg", switches=switches[1:])
+    names = [name for name in plan.topics if f"/{name}" in recorded]
+    assert {"lqg/velocity_command", "force_loop/terms", "selector/terms"} <= set(names)
+    for topic in map(by_name, names):
+        for name in topic.fields:
+            values = [
+                conversions.values(topic, message)[name]
+                for _, message in recorded[f"/{topic.name}"]
+            ]
+            assert np.array_equal(values, expected[name]), name
+    for node in ("lqg", "pfc", "force_loop"):
         assert same(replay(bag, node, {})), node
 
 
@@ -175,7 +217,11 @@ def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"
         counts: dict[str, int] = {}
+        statuses = 0
         for schema, channel, message, decoded in reader.iter_decoded_messages():
+            if channel.topic == DIAGNOSTICS:
+                statuses += 1
+                continue
             k = counts.get(channel.topic, 0)
             counts[channel.topic] = k + 1
             topic = by_name(channel.topic[1:])
@@ -194,7 +240,7 @@ def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
     assert not re.search(r"[&*]id\d", text)  # rosbag2 writes no anchors
     info = yaml.safe_load(text)["rosbag2_bagfile_information"]
     assert info["version"] == 9
-    assert info["message_count"] == sum(counts.values())
+    assert info["message_count"] == sum(counts.values()) + statuses
     assert info["duration"]["nanoseconds"] == 1_000_000_000 - 1_000_000_000 % CONTROL_PERIOD_NS
     with AnyReader([bag]) as opened:
         for connection in opened.connections:
@@ -209,7 +255,8 @@ def test_schema_text_is_the_one_that_ros_distributes(tmp_path: Path) -> None:
     from emir_ros.message_definitions import definition, type_hash
 
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name in {topic.type for topic in TOPICS} | {"geometry_msgs/msg/PoseStamped"}:
+    beside = {"geometry_msgs/msg/PoseStamped", "diagnostic_msgs/msg/DiagnosticArray"}
+    for name in {topic.type for topic in TOPICS} | beside:
         parsed = get_types_from_msg(definition(name), name)
         assert name in parsed
         for inner, fields in parsed.items():
@@ -347,7 +394,10 @@ def test_a_recording_is_never_overwritten(
 def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) -> None:
     """Parameters as set and as left alone, and what every field means."""
     file, bag = tmp_path / "params.yaml", tmp_path / "run"
-    file.write_text("cascade_node: {ros__parameters: {gain: 1.5}}\n")
+    file.write_text(
+        "cascade_node: {ros__parameters: {gain: 1.5}}\n"
+        "plant_node: {ros__parameters: {effects.payload.mass: 500.0, sensors.seed: 7}}\n"
+    )
     words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(bag)]) == 0
     with (bag / "run_0.mcap").open("rb") as stream:
@@ -359,7 +409,11 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     assert parameters["cascade_node"]["gain"] == 1.5
     assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
     assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
+    assert stored["emir.machine"] == {"effects": "payload mass = 500 kg", "seed": "7"}
+    assert {"effects: payload mass = 500 kg", "seed: 7"} <= set(text(info(bag)).splitlines())
     for channel in summary.channels.values():
+        if channel.topic == DIAGNOSTICS:
+            continue
         topic = by_name(channel.topic[1:])
         fields = json.loads(channel.metadata["fields"])
         assert {name: entry["unit"] for name, entry in fields.items()} == {
@@ -388,8 +442,13 @@ def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> No
         _started([*commands["left"], str(tmp_path / "left")]) as left,
         _started([*commands["right"], str(tmp_path / "right")]) as right,
     ):
-        said = left.communicate(timeout=120), right.communicate(timeout=120)
-    assert left.returncode == right.returncode == 0, said
+        ends = left.communicate(timeout=120), right.communicate(timeout=120)
+    assert left.returncode == right.returncode == 0, ends
+    for side in ("alone", *gains):
+        place = "" if side == "alone" else f"/{side}"
+        said = {(at, name): message for at, name, message in _statuses(tmp_path / side)}
+        assert said.keys() == {(0, f"{place}/{name}") for name in NODES}
+        assert said[0, f"{place}/cascade_node"] == "running"
     alone = _raw(tmp_path / "alone")
     same_machine, other_gain = _raw(tmp_path / "left"), _raw(tmp_path / "right")
     assert same_machine == {f"/left{topic}": data for topic, data in alone.items()}
@@ -397,10 +456,25 @@ def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> No
     assert other_gain["/right/truth"] != alone["/truth"]
 
 
+def _statuses(bag: Path) -> list[tuple[int, str, str]]:
+    """Log time, node and message of what was said on /diagnostics."""
+    with AnyReader([bag]) as reader:
+        said = [
+            (log_time, status.name, status.message)
+            for connection, log_time, data in reader.messages()
+            if connection.topic == DIAGNOSTICS
+            for status in reader.deserialize(data, connection.msgtype).status  # type: ignore[attr-defined]
+        ]
+    return sorted(said)
+
+
 def _raw(bag: Path) -> dict[str, list[bytes]]:
+    """The topics of the table, as they stand in the file."""
     found: dict[str, list[bytes]] = {}
     with AnyReader([bag]) as reader:
         for connection, _, data in reader.messages():
+            if connection.topic == DIAGNOSTICS:
+                continue
             found.setdefault(connection.topic, []).append(bytes(data))
     return found
 

@@ -12,7 +12,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 import rclpy
 from rclpy.node import Node
 
-from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, RECORDED, ROBOT
+from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ORDERS, RECORDED, ROBOT
 from emir_ros.graph import CONTROLLERS, MODELS, NODES, ROBOT_CONTROLLERS
 from emir_ros.shell import Shell
 
@@ -58,7 +58,7 @@ def test_the_graph_publishes_what_the_table_says(model: str, tmp_path: Path) -> 
         for node in (observer, *nodes):
             node.destroy_node()
         rclpy.shutdown()
-    beside = {f"/{RECORDED}", *FOR_THE_EYE, *EVERYBODYS}
+    beside = {f"/{RECORDED}", f"/{ORDERS}", *FOR_THE_EYE, *EVERYBODYS}
     beside |= {f"/{name}/transition_event" for name in names}
     assert {entry for entry in found if entry[1] not in beside} == wanted
 

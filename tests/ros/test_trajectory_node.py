@@ -20,7 +20,12 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from emir_analysis.robot_setup import Posture
 from emir_msgs_py import conversions
-from emir_msgs_py.robot_topics import JOINTS, ROBOT_CYLINDER_REFERENCE, ROBOT_JOINT_STATES
+from emir_msgs_py.robot_topics import (
+    JOINTS,
+    ROBOT_CYLINDER_REFERENCE,
+    ROBOT_CYLINDER_STATES,
+    ROBOT_JOINT_STATES,
+)
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     CYLINDER_REFERENCE,
@@ -34,6 +39,7 @@ from emir_ros.trajectory_node import TrajectoryNode
 DT = CONTROL_PERIOD_NS * 1e-9
 SIGNALS = {JOINT1: {"stroke": 0.4, "force": 0.0}} | {
     ROBOT: {f"{name}_angle": value for name, value in zip(JOINTS, Posture().angles, strict=True)}
+    | {f"{name}_{what}": 0.0 for name in JOINTS for what in ("stroke", "force")}
 }
 
 
@@ -45,17 +51,14 @@ class Bench(Node):
         words = ["lockstep:=true", f"model:={model}", "delay:=0.1", "pause:=0.2"]
         self.node = TrajectoryNode(["--ros-args", *(w for p in words for w in ("-p", p))])
         robot = model == ROBOT
-        self._state, self._reference = (
-            (ROBOT_JOINT_STATES, ROBOT_CYLINDER_REFERENCE)
-            if robot
-            else (CYLINDER_STATES, CYLINDER_REFERENCE)
-        )
+        states = (ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES) if robot else (CYLINDER_STATES,)
+        self._reference = ROBOT_CYLINDER_REFERENCE if robot else CYLINDER_REFERENCE
         self.signals = SIGNALS[model]
         self.heard: list[dict[str, float]] = []
         self.said: list[str] = []
         profile = qos.offered(lockstep=True)
-        kind = conversions.message_class(self._state.type)
-        self._states = self.create_publisher(kind, self._state.name, profile)
+        kind = conversions.message_class(self._reference.type)
+        self._states = [(t, self.create_publisher(kind, t.name, profile)) for t in states]
         self._waypoints = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
         self.create_subscription(kind, self._reference.name, self._on_reference, profile)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
@@ -83,7 +86,8 @@ class Bench(Node):
         """Go on by a duration, s."""
         for _ in range(round(duration / DT)):
             stamp = len(self.heard) * CONTROL_PERIOD_NS
-            self._states.publish(conversions.message(self._state, stamp, self.signals))
+            for topic, publisher in self._states:
+                publisher.publish(conversions.message(topic, stamp, self.signals))
             self.until(lambda stamp=stamp: len(self.heard) * CONTROL_PERIOD_NS > stamp)
 
     def told(self, text: str) -> None:

@@ -8,10 +8,12 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
 
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import JOINT_STATES, TOPICS, TRUTH, Topic
-from emir_ros.wire import Wire, stamp_ns
+from emir_ros.wire import Wire, clock_message, header_message, stamp_ns
 
 STAMP = 12_345_678_901
 
@@ -65,3 +67,14 @@ def test_a_signal_that_is_not_there_is_named() -> None:
         Wire(JOINT_STATES).decode(serialize_message(message))
     with pytest.raises(KeyError):
         Wire(TRUTH).encode(STAMP, {})
+
+
+def test_a_time_alone_is_read_by_the_middleware() -> None:
+    clock = deserialize_message(clock_message(STAMP), Clock).clock
+    header = deserialize_message(header_message(STAMP), Header)
+    assert (clock.sec, clock.nanosec) == divmod(STAMP, 10**9)
+    assert header.stamp == clock
+    assert not header.frame_id
+    types = get_typestore(Stores.ROS2_JAZZY)
+    read = types.deserialize_cdr(header_message(STAMP), "std_msgs/msg/Header")
+    assert types.serialize_cdr(read, "std_msgs/msg/Header") == header_message(STAMP)

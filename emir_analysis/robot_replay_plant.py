@@ -1,0 +1,75 @@
+"""The whole robot replayed: recorded valve commands in, sensors and truth against the recorded."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_analysis.replay_plant import check_recorded, check_start, finite
+from emir_analysis.robot_machine import OUTPUTS, PLANT_PERIOD, commands, sensor_signals
+from emir_analysis.robot_setup import Posture
+from emir_analysis.stamped import FieldComparison, Signals, by_stamp, compared
+from emir_common.parameter_tree import declared, with_values
+from emir_common.quantity import ParameterError
+from emir_msgs_py.robot_topics import ROBOT_VALVE_COMMAND
+from emir_msgs_py.topics import PLANT_PERIOD_NS
+from emir_plant.robot.plant import RobotPlant
+from emir_plant.robot.sheet import robot
+
+MAIN = "main."  # joint 1's parameters have no such word in front of them in the graph
+ANGLES = "initial_angles."
+PRESSURE = "initial_pressure_lowering"
+FILES = ("robot_file", "machine_file")
+
+Array = NDArray[np.float64]
+Rows = list[tuple[Signals, Signals]]
+
+
+def replay_robot_plant(
+    bag: Path, values: Mapping[str, Any], changed: Mapping[str, Any]
+) -> list[FieldComparison]:
+    """Simulate the recorded robot under the recorded valve commands.
+
+    values: parameters of the recorded plant node by dotted name, over which those that are changed
+    prevail. Raises as `replay_plant`.
+    """
+    check_recorded(bag, values, (PRESSURE,))
+    given = {**values, **changed}
+    machine = robot(*(Path(given[name]) if given.get(name) else None for name in FILES))
+    paths = {path.removeprefix(MAIN): path for path in declared(machine)}
+    start = {f"{ANGLES}{joint}" for joint in declared(Posture())}
+    for name in changed:
+        if name not in paths and name not in {*start, *FILES, PRESSURE}:
+            raise ParameterError(f"plant: {name}: there is no such parameter")
+    try:
+        machine = with_values(machine, {paths[k]: v for k, v in given.items() if k in paths})
+        angles = {k.removeprefix(ANGLES): v for k, v in given.items() if k in start}
+        posture = with_values(Posture(), angles)
+    except ParameterError as error:
+        raise ParameterError(f"plant: {error}") from None
+    outputs = by_stamp(bag, OUTPUTS, PLANT_PERIOD_NS)
+    orders = by_stamp(bag, (ROBOT_VALVE_COMMAND,), PLANT_PERIOD_NS)
+    check_start(bag, outputs, orders)
+    plant = RobotPlant(machine)
+    state = plant.initial(posture.angles, float(given[PRESSURE]))
+    return compared(OUTPUTS, _rows(plant, state, orders, outputs))
+
+
+def _rows(
+    plant: RobotPlant, state: Array, orders: dict[int, Signals], outputs: dict[int, Signals]
+) -> Rows:
+    """Return recorded and simulated signals of every plant period."""
+    truth = plant.outputs(state)
+    rows: Rows = []
+    for tick in range(len(outputs)):
+        stamp = tick * PLANT_PERIOD_NS
+        if stamp not in outputs:
+            break  # a gap: what follows has no known command
+        rows.append((outputs[stamp], sensor_signals(plant, truth, tick)))
+        if stamp not in orders:
+            break  # the run's end
+        valves = {name: finite(value) for name, value in orders[stamp].items()}
+        state, truth = plant.step(state, commands(valves), PLANT_PERIOD)
+    return rows

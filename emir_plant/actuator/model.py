@@ -25,7 +25,8 @@ from emir_plant.jit import compiled
 
 Array = NDArray[np.float64]
 
-STEPS = 2  # of the integration between two samples
+STEPS = 2  # of the integration between two samples, at least
+RESOLVED = 2.0  # of the fastest rate times a step; RK4 is stable up to 2.8
 STATES = 8
 SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
 NOWHERE = 1e6  # a pressure that only a run out of all bounds has
@@ -125,6 +126,22 @@ def _friction(velocity: float, p: Any) -> float:
 
 
 @compiled
+def _damper(p: Any) -> float:
+    """Return the elastic arm's damping, pressure per velocity."""
+    stiffness = 1.0 / p.effects_elastic_boom_compliance
+    return 2.0 * p.effects_elastic_boom_damping * np.sqrt(stiffness) / p.load_frequency
+
+
+@compiled
+def _steps(p: Any, period: float) -> int:
+    """Return the steps between two samples that resolve a light piston on the oil."""
+    if p.effects_elastic_boom_compliance == 0.0:
+        return STEPS
+    fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
+
+
+@compiled
 def _light_piston(pressure: float, damper: float, p: Any) -> float:
     """Return the velocity at which friction and the arm's damper resist with this pressure."""
     moving = max(abs(pressure) - p.effects_coulomb_friction_force, 0.0)
@@ -148,9 +165,8 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     mass = p.load_frequency * p.load_frequency
     load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
     if p.effects_elastic_boom_compliance > 0.0:
-        softness = p.effects_elastic_boom_compliance
-        damper = 2.0 * p.effects_elastic_boom_damping / (p.load_frequency * np.sqrt(softness))
-        spring = x[ARM_WAY] / softness
+        damper = _damper(p)
+        spring = x[ARM_WAY] / p.effects_elastic_boom_compliance
         velocity = _light_piston(pressure - load - spring + damper * x[ARM], damper, p)
         carrier = x[ARM]
         slope[VELOCITY] = 0.0
@@ -210,7 +226,8 @@ def _run(parameters: Any, command: Any, measured: Any, period: float, start: flo
     x, y = np.zeros(STATES), np.zeros(STATES)
     a, b, c, d = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES)
     free = measured.size == 0
-    h = period / STEPS
+    steps = _steps(p, period)
+    h = period / steps
     lag = p.effects_command_delay_delay / period
     play = p.effects_valve_hysteresis_play
     line = p.effects_line_resistance_coefficient
@@ -222,8 +239,8 @@ def _run(parameters: Any, command: Any, measured: Any, period: float, start: flo
         seen = _loss(_flow(x[SPOOL], now, p), line)
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
-        for j in range(STEPS):
-            time = k + (j + 0.5) / STEPS
+        for j in range(steps):
+            time = k + (j + 0.5) / steps
             wanted = _at(command, time - lag)
             held = min(max(held, wanted - play), wanted + play)
             oil = 0.0

@@ -155,6 +155,7 @@ def _bag(words: list[str]) -> int:
 def _replay(words: list[str]) -> int:
     import yaml
 
+    from emir_analysis.recorded_orders import orders
     from emir_analysis.replay import NODES, replay, text
     from emir_analysis.stamped import same
 
@@ -176,6 +177,8 @@ def _replay(words: list[str]) -> int:
         except yaml.YAMLError:
             raise InputError(f"--set {entry}: {value} is not a value") from None
     fields = replay(options.bag, options.node, changed)
+    for order in orders(options.bag, f"{options.node}_node"):
+        print(order.line)
     print(text(fields, changed))
     return 0 if changed or same(fields) else 1
 

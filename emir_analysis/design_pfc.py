@@ -122,8 +122,10 @@ def scheduled(
 ) -> PfcParameters:
     """Return a design whose models follow posture, rad, and payload, kg; both rising.
 
-    Where the machine has no slow motion with a payload, the model of the next steeper posture
-    stands in. Raises SimulationError where it has none in the steepest.
+    Where the machine has no slow motion with a payload, or one for which its pump is short, the
+    model of the next steeper posture stands in: short of pressure the flow yields to the load,
+    which damps as nothing damps once the pressure is there. Raises SimulationError where the
+    steepest has none.
     """
     models: list[tuple[InternalModel, ...]] = []
     for payload in payloads:
@@ -131,17 +133,33 @@ def scheduled(
         for angle in reversed(angles):
             point = replace(task.point, angle=angle, payload=payload)
             try:
-                row.insert(0, design_pfc(machine, replace(task, point=point)).model)
+                short = bool(row) and pump_is_short(machine, point)
+                found = None if short else design_pfc(machine, replace(task, point=point)).model
             except SimulationError:
                 if not row:
                     raise
-                row.insert(0, row[0])
+                found = None
+            row.insert(0, found or row[0])
         models.append(tuple(row))
     p = Plant(machine).record[0]
     strokes = np.array([linkage.stroke(angle, p) for angle in angles])
     forces = np.array([[_static_force(machine, a, load) for a in angles] for load in payloads])
     schedule = Schedule(strokes, np.array(payloads), forces, tuple(models))
     return replace(design_pfc(machine, task), schedule=schedule)
+
+
+def pump_is_short(machine: Machine, point: OperatingPoint) -> bool:
+    """Return whether a steady motion leaves the pressure balance less than it holds over the edge.
+
+    Raises SimulationError as `steady_motion`.
+    """
+    plant = Plant(with_values(machine, {"geometry.payload": point.payload}))
+    shown, lines = plant.outputs(steady_motion(plant, point)[0]), machine.resistances
+    into = shown.flow_lifting, shown.pressure_lifting
+    if point.velocity < 0.0:
+        into = shown.flow_lowering, shown.pressure_lowering
+    lost = (lines.k_pump_line + lines.k_block_in) * into[0] ** 2
+    return machine.supply.p0 - lost - into[1] < machine.valve.balance_pressure
 
 
 def _static_force(machine: Machine, angle: float, payload: float) -> float:

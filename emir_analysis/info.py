@@ -9,8 +9,10 @@ import yaml
 from mcap.records import Channel, Metadata, Schema
 
 from emir_analysis import bags
+from emir_analysis.machine_record import PLANT, machine_record
 
 DESCRIPTION = "emir"  # the metadata record in which the graph describes its run
+MACHINE = "emir.machine"  # the one with the effects that are on, and the seed
 PARAMETERS = "emir.parameters"  # the one with the parameters of its nodes, JSON by node
 CHANGE = "emir.parameter_change"  # with a number behind it: one that was set during the run
 FIELDS = "fields"  # the channel metadata with path, unit and meaning by signal, JSON
@@ -117,6 +119,8 @@ def text(found: Info) -> str:
     """Return what is known as lines of text."""
     messages = sum(topic.count for topic in found.topics.values())
     lines = [f"{key}: {value}" for key, value in found.about.items() if key != "duration"]
+    machine = machine_record(found.parameters.get(PLANT, {}))
+    lines += [f"{key}: {value}" for key, value in machine.items()]
     lines.append(f"recorded: {found.duration:.3f} s, {messages} messages")
     lines.append(f"file: {_state(found)}")
     for change in found.changes.values():

@@ -212,7 +212,7 @@ class PfcControl:
         inputs = self._inputs(signals)
         law: Any = self.pfc
         state, outputs = law.step(state or law.initial(inputs), inputs, dt)
-        return state, _pfc_signals("pfc", outputs)
+        return state, pfc_signals("pfc", outputs)
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -247,7 +247,7 @@ class PfcTipControl:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
-        return state, _pfc_signals("pfc_tip", outputs)
+        return state, pfc_signals("pfc_tip", outputs)
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -366,7 +366,8 @@ def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
     return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
 
 
-def _pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
+def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
+    """Return a predictive law's outputs by signal; terms of the law have the prefix."""
     terms = outputs._asdict()
     command = terms.pop("velocity_command")
     named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}

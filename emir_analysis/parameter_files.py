@@ -1,7 +1,8 @@
 """The files that parameters name, such as a design or a machine: kept in the recording of a run.
 
 Each is an attachment `parameter_files/NODE/PARAMETER/FILE`. A file that one of these is based on
-lies beside it.
+lies beside it. A controller's design is kept also where it is one of the project's own: of other
+versions these may differ.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,22 +16,22 @@ from mcap.records import Attachment
 from emir_analysis import bags
 from emir_common.quantity import ParameterError
 from emir_common.yaml_file import read_map
+from emir_control import pfc_file
+from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_plant.sheet import BASED_ON
 
 FOLDER = "parameter_files"
 SUFFIX = "_file"  # of the parameters that name one
+DESIGN, DESIGNED = "model_file", {"pfc_node": STROKE, "pfc_tip_node": TIP_ANGLE}
 MEDIA_TYPE = "application/yaml"
 
 
 def attachments(node: str, values: Mapping[str, Any]) -> Iterator[Attachment]:
-    """Yield the files that a node's parameters name.
-
-    A name that is no file, such as `scheduled`, is one of the project's own. Raises ParameterError
-    for a file that cannot be read.
-    """
+    """Yield the files that a node's parameters name. Raises ParameterError for a broken one."""
     for parameter, name in sorted(values.items()):
-        if parameter.endswith(SUFFIX) and name and Path(str(name)).is_file():
-            for file in _with_base(Path(name)):
+        named = _named(node, parameter, str(name))
+        if named is not None:
+            for file in _with_base(named):
                 path = f"{FOLDER}/{node}/{parameter}/{file.name}"
                 yield Attachment(0, 0, path, MEDIA_TYPE, _content(file))
 
@@ -49,9 +50,24 @@ def unpacked(bag: Path, node: str, values: Mapping[str, Any]) -> Iterator[dict[s
                     file = Path(folder) / parameter / name
                     file.parent.mkdir(exist_ok=True)
                     file.write_bytes(attachment.data)
-                    if name == Path(str(values.get(parameter, ""))).name:
+                    if name == _name(node, parameter, values):
                         kept[parameter] = str(file)
         yield kept
+
+
+def _named(node: str, parameter: str, name: str) -> Path | None:
+    """Return the file that a parameter means, None where it means none."""
+    if parameter == DESIGN and node in DESIGNED:
+        return pfc_file.find(name, DESIGNED[node])
+    return Path(name) if parameter.endswith(SUFFIX) and Path(name).is_file() else None
+
+
+def _name(node: str, parameter: str, values: Mapping[str, Any]) -> str:
+    """Return how the file was called that a parameter meant; it need not be there any more."""
+    name = str(values.get(parameter, ""))
+    if parameter == DESIGN and node in DESIGNED:
+        return pfc_file.find(name, DESIGNED[node]).name
+    return Path(name).name
 
 
 def _with_base(file: Path) -> list[Path]:

@@ -11,6 +11,7 @@ from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.info import CHANGE
 from emir_analysis.run_signals import full_name_of
+from emir_analysis.switching import Choosing
 from emir_control.waypoints import Waypoints
 from emir_msgs_py.topics import ORDERS
 
@@ -23,6 +24,13 @@ class Order(NamedTuple):
     stamp: int
     what: str
     values: dict[str, Any]
+
+    @property
+    def line(self) -> str:
+        """Return what it was and since when."""
+        set_ = ", ".join(f"{name} = {value}" for name, value in self.values.items())
+        detail = f" {set_}" if self.what == SET else ""
+        return f"from {self.stamp * 1e-9:.3f} s: {self.what}{detail}"
 
 
 def as_values(points: Waypoints) -> dict[str, Any]:
@@ -100,6 +108,8 @@ class Obedience:
         return state
 
     def _done(self, order: Order, state: Any, dt: float) -> Any:
+        if order.what == SET and isinstance(self.control, Choosing):
+            return self.control.choose(state, order.values["controller"])
         if order.what == SET:
             self._values |= order.values
             self.control = self._made()

@@ -7,7 +7,7 @@ had set during the run comes at its recorded period.
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
@@ -30,7 +30,7 @@ from emir_analysis.replay_plant import replay_plant
 from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
-from emir_analysis.switching import Ready
+from emir_analysis.switching import Choosing, Ready, Selector, Switch
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -46,13 +46,16 @@ from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
+    OUTER_LOOPS,
     SELECTOR_TERMS,
     VELOCITY_COMMAND,
 )
 from emir_plant.sheet import joint1
 
 PLANT = "plant"
-NODES = ("trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "force_loop", PLANT)
+NODES = (
+    "trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "selector", "force_loop", PLANT,
+)  # fmt: skip
 
 
 def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldComparison]:
@@ -156,9 +159,22 @@ def _trajectory(values: Values) -> NodeControl:
     return TrajectoryControl(named(name, with_values(TrajectoryParameters(), values)))
 
 
+def _selector(values: Values) -> NodeControl:
+    names = values.pop("controllers", list(OUTER_LOOPS))
+    times, switched = values.pop("switch_times", [0.0]), values.pop("switch_to", names[:1])
+    first = values.pop("controller", switched[0])
+    for name in values:
+        raise ParameterError(f"{name}: there is no such parameter")
+    if len(times) != len(switched):
+        raise ParameterError("switch_times and switch_to differ in length")
+    switches = [Switch(*pair) for pair in zip(times, switched, strict=True)]
+    # cast: its inputs are those of the controllers that run
+    return cast("NodeControl", Choosing(Selector(names, switches), first))
+
+
 _CONTROLS = {
     "trajectory": _trajectory, "cascade": _cascade, "pfc": _pfc, "pfc_tip": _pfc_tip,
-    "lqg": _lqg, "mpc": _mpc, "force_loop": _force_loop,
+    "lqg": _lqg, "mpc": _mpc, "selector": _selector, "force_loop": _force_loop,
 }  # fmt: skip
 
 

@@ -11,10 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals, Topics
+from emir_analysis.node_controls import Signals, Topics, pfc_signals
 from emir_analysis.robot_setup import RobotForceLoopParameters
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.drive_loop import DriveLoop, DriveLoopInputs
+from emir_control.pfc import PREVIEW, Pfc, PfcInputs
 from emir_control.robot_trajectory import RobotTrajectory, RobotTrajectoryInputs
 from emir_control.trajectory import Reference
 from emir_control.waypoints import Waypoints
@@ -22,15 +23,18 @@ from emir_msgs_py.robot_topics import (
     JOINTS,
     PRESSURES,
     ROBOT_CASCADE_TERMS,
+    ROBOT_CYLINDER_PREVIEW,
     ROBOT_CYLINDER_REFERENCE,
     ROBOT_CYLINDER_STATES,
     ROBOT_FORCE_LOOP_TERMS,
     ROBOT_JOINT_STATES,
+    ROBOT_PFC_TERMS,
     ROBOT_VALVE_COMMAND,
     ROBOT_VELOCITY_COMMAND,
     TCP_REFERENCE,
     of_joints,
 )
+from emir_msgs_py.topics import CYLINDER_PREVIEW
 
 Array = NDArray[np.float64]
 
@@ -42,7 +46,7 @@ class RobotTrajectoryControl:
     """trajectory_node: the desired motion of all pistons, and of the TCP."""
 
     inputs: ClassVar[Topics] = (ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES)
-    outputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, TCP_REFERENCE)
+    outputs: ClassVar[Topics] = (ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, TCP_REFERENCE)
     trajectory: RobotTrajectory
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
@@ -53,8 +57,12 @@ class RobotTrajectoryControl:
             state is None and not np.isfinite([angles, forces]).all()
         ):  # begins with the first numbers
             return None, {name: math.nan for topic in self.outputs for name in topic.fields}
-        state, now = self.trajectory.step(state or self.trajectory.initial(inputs), inputs, dt)
-        outputs = _signals("reference_stroke", now.strokes)
+        state = state or self.trajectory.initial(inputs)
+        ahead = self.trajectory.ahead(state, PREVIEW, dt)
+        state, now = self.trajectory.step(state, inputs, dt)
+        preview = map(float, ahead.T.ravel())
+        outputs = dict(zip(ROBOT_CYLINDER_PREVIEW.fields, preview, strict=True))
+        outputs |= _signals("reference_stroke", now.strokes)
         outputs |= _signals("reference_velocity", now.velocities)
         outputs |= _signals("reference_force", now.forces)
         yaw = math.atan2(now.place[1], now.place[0])
@@ -90,6 +98,32 @@ class RobotCascadeControl:
             own = state[joint] if state else self.cascade.initial(inputs)
             after[joint], shown = self.cascade.step(own, inputs, dt)
             outputs |= {f"{joint}_{name}": value for name, value in shown._asdict().items()}
+            outputs[f"{joint}_expected_force"] = signals[f"{joint}_reference_force"]
+        return after, outputs
+
+
+@dataclass(frozen=True)
+class RobotPfcControl:
+    """pfc_node: law (12) for every joint, with the same model and tuning."""
+
+    inputs: ClassVar[Topics] = (
+        ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, ROBOT_CYLINDER_STATES,
+    )  # fmt: skip
+    outputs: ClassVar[Topics] = (ROBOT_PFC_TERMS, ROBOT_VELOCITY_COMMAND)
+    pfc: Pfc
+
+    def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
+        """Return the next state, the commands and their terms."""
+        after: dict[str, Any] = {}
+        outputs: Signals = {}
+        for joint in JOINTS:
+            wanted = signals[f"{joint}_reference_stroke"], signals[f"{joint}_reference_velocity"]
+            preview = [signals[f"{joint}_{name}"] for name in CYLINDER_PREVIEW.fields]
+            inputs = PfcInputs(*wanted, preview, signals[f"{joint}_stroke"])
+            own = state[joint] if state else self.pfc.initial(inputs)
+            after[joint], shown = self.pfc.step(own, inputs, dt)
+            terms = pfc_signals("pfc", shown)
+            outputs |= {f"{joint}_{name}": value for name, value in terms.items()}
             outputs[f"{joint}_expected_force"] = signals[f"{joint}_reference_force"]
         return after, outputs
 

@@ -53,7 +53,9 @@ def write_picture(runs: Mapping[str, Recording], file: Path) -> None:
     """Write the picture, its kind by the file's name. Raises InputError when that fails."""
     try:
         path_picture(runs).savefig(file, dpi=120)
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror}") from None
+    except ValueError as error:  # no kind of picture
         raise InputError(f"{file}: {error}") from None
 
 

@@ -10,24 +10,27 @@ from emir_analysis.recorded_orders import Obedience, orders
 from emir_analysis.robot_controls import (
     RobotCascadeControl,
     RobotForceLoopControl,
+    RobotPfcControl,
     RobotTrajectoryControl,
 )
 from emir_analysis.robot_setup import (
     cascade_parameters,
     force_loops,
     path_parameters,
+    pfc_parameters,
     trajectory,
 )
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_control.cascade import Cascade
+from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-NODES = ("trajectory", "cascade", "force_loop")
+NODES = ("trajectory", "cascade", "pfc", "force_loop")
 PLANT = "plant"
 FILES = ("robot_file", "machine_file")
 
@@ -83,6 +86,8 @@ def _recorded(bag: Path, topics: list[Topic], period: int) -> dict[int, Signals]
 def _control(node: str, values: dict[str, Any]) -> NodeControl:
     if node == "cascade":
         return RobotCascadeControl(Cascade(with_values(cascade_parameters(), values)))
+    if node == "pfc":
+        return RobotPfcControl(Pfc(with_values(pfc_parameters(), values)))
     sheet = robot(*(Path(name) if name else None for name in (values.pop(f, "") for f in FILES)))
     if node == "force_loop":
         return RobotForceLoopControl(with_values(force_loops(sheet), values))

@@ -16,7 +16,9 @@ from mcap.writer import CompressionType, Writer
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 
-CHUNK = 64 * 1024  # bytes: what a recorder that is killed outright may lose between two flushes
+# bytes: what a recorder that is killed outright may lose between two flushes. Each chunk has its
+# entry of 1.3 kB in the index that the writer holds until the file is finished.
+CHUNK = 256 * 1024
 COMPRESSIONS = {"none": CompressionType.NONE, "zstd": CompressionType.ZSTD}
 
 

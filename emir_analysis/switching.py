@@ -113,6 +113,39 @@ class Selector:
         return {"velocity_command": command, "applied_command": command} | active
 
 
+class Chosen(NamedTuple):
+    """How many periods have passed, and whose command is handed on."""
+
+    ticks: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Choosing:
+    """selector_node as it runs: by the switches, or by who was chosen last. first: who begins."""
+
+    outputs: ClassVar[Topics] = Selector.outputs
+    selector: Selector
+    first: str
+
+    @property
+    def inputs(self) -> Topics:
+        """Return the commands of the controllers that are there."""
+        return tuple(OFFERED_COMMANDS[name] for name in self.selector.controllers)
+
+    def step(self, state: Chosen | None, signals: Signals, dt: float) -> tuple[Chosen, Signals]:
+        """Return the next state and the chosen controller's command; state None: begin here."""
+        ticks, name = state or Chosen(0, self.first)
+        due = self.selector.due(ticks, dt)
+        if ticks and due != self.selector.due(ticks - 1, dt):
+            name = due
+        return Chosen(ticks + 1, name), self.selector.selected(name, signals)
+
+    def choose(self, state: Chosen | None, name: str) -> Chosen:
+        """Return the state in which that controller drives from the next period on."""
+        return Chosen(state.ticks if state else 0, name)
+
+
 @dataclass(frozen=True)
 class SwitchedLoop:
     """The same without ROS. controls: by name."""

@@ -82,14 +82,19 @@ def _split(model: InternalModel) -> tuple[tuple[Array, Array, Array], float]:
 
 def _balanced(A: Array, B: Array, C: Array, order: int) -> tuple[Array, Array, Array]:
     """Return the balanced truncation of a stable model (square-root method, Moore 1981)."""
-    reach = _root(linalg.solve_discrete_lyapunov(A, np.outer(B, B)))
-    observe = _root(linalg.solve_discrete_lyapunov(A.T, np.outer(C, C)))
+    reach = _root(_gramian(A, B))
+    observe = _root(_gramian(A.T, C))
     U, hankel, V = linalg.svd(observe.T @ reach)
     if hankel[order - 1] < np.finfo(float).eps * hankel[0]:
         raise ParameterError(f"order = {order + 1}: the model has nothing more to keep")
     scale = 1.0 / np.sqrt(hankel[:order])
     left, right = (observe @ U[:, :order]) * scale, (reach @ V[:order].T) * scale
     return left.T @ A @ right, left.T @ B, C @ right
+
+
+def _gramian(A: Array, B: Array) -> Array:
+    """Return X = A X A^T + B B^T. By Schur's form: it takes badly scaled states, too."""
+    return np.asarray(linalg.solve_discrete_lyapunov(A, np.outer(B, B), method="bilinear"))
 
 
 def _root(gramian: NDArray[Any]) -> Array:

@@ -171,6 +171,11 @@ class RobotTrajectory:
         reference = state.path.at(way.stroke, way.velocity, (after - before) / dt)
         return state._replace(ticks=state.ticks + 1), reference
 
+    def ahead(self, state: RobotTrajectoryState, count: int, dt: float) -> Array:
+        """Return the strokes, (count, 6), of the periods that follow the next step's own."""
+        times = ((state.ticks + k) * dt for k in range(1, count + 1))
+        return np.asarray(state.path.strokes([state.timing.at(time).stroke for time in times]))
+
     def held(self, state: RobotTrajectoryState, dt: float) -> RobotTrajectoryState:
         """Return the state that comes to rest on its path and stays there."""
         return state._replace(timing=state.timing.held(state.ticks * dt), ticks=0)

@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from emir_msgs_py.topics import (
+    CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
     JOINT_STATES,
+    PFC_TERMS,
     TRUTH,
     VALVE_COMMAND,
     VELOCITY_COMMAND,
@@ -107,6 +109,15 @@ ROBOT_CYLINDER_REFERENCE = _six(
     ("reference_stroke", "position", "m"), ("reference_velocity", "velocity", "m/s"),
     ("reference_force", "effort", "N"),
 )  # fmt: skip
+ROBOT_CYLINDER_PREVIEW = named_numbers(
+    CYLINDER_PREVIEW.name, CYLINDER_PREVIEW.publisher, "control",
+    {
+        f"{joint}_{name}": _units(joint, field.unit)
+        for joint in JOINTS
+        for name, field in CYLINDER_PREVIEW.fields.items()
+    },
+    "command",
+)  # fmt: skip
 TCP_REFERENCE = _pose("tcp_reference", "trajectory_node", "tcp_reference", "command")
 ROBOT_VELOCITY_COMMAND = _six(
     VELOCITY_COMMAND, GROUND,
@@ -118,6 +129,10 @@ ROBOT_CASCADE_TERMS = _terms(
     "cascade/terms", "cascade_node", "control",
     (("feedforward", "m/s"), ("feedback", "m/s"), ("smoothed_reference", "m")),
 )  # fmt: skip
+ROBOT_PFC_TERMS = _terms(
+    PFC_TERMS.name, PFC_TERMS.publisher, "control",
+    [(name, field.unit) for name, field in PFC_TERMS.fields.items()],
+)  # fmt: skip
 ROBOT_FORCE_LOOP_TERMS = _terms(
     "force_loop/terms", "force_loop_node", "plant",
     (("measured_force", "N"), ("force_feedback", "m/s"), ("wanted_velocity", "m/s"),
@@ -126,6 +141,6 @@ ROBOT_FORCE_LOOP_TERMS = _terms(
 
 ROBOT_TOPICS: tuple[Topic, ...] = (
     ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES, PRESSURES, TCP_POSE, TCP_DEFLECTION, ROBOT_TRUTH,
-    ROBOT_CYLINDER_REFERENCE, TCP_REFERENCE, ROBOT_VELOCITY_COMMAND, ROBOT_VALVE_COMMAND,
-    ROBOT_CASCADE_TERMS, ROBOT_FORCE_LOOP_TERMS,
+    ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, TCP_REFERENCE, ROBOT_VELOCITY_COMMAND,
+    ROBOT_VALVE_COMMAND, ROBOT_CASCADE_TERMS, ROBOT_PFC_TERMS, ROBOT_FORCE_LOOP_TERMS,
 )  # fmt: skip

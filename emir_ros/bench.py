@@ -22,18 +22,18 @@ import numpy as np
 import rclpy
 from numpy.typing import NDArray
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 
-from emir_analysis import bags
+from emir_analysis import bags, columns
 from emir_analysis.bench.reading import reading_figures
 from emir_analysis.bench.timing import Figure, text, write_json
+from emir_analysis.columns import Columns
 from emir_analysis.errors import InputError
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
 from emir_ros import qos
 from emir_ros.graph import Plan
-from emir_ros.main import keep_out_of_garbage_collection
+from emir_ros.main import keep_out_of_garbage_collection, make_executor
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
 from emir_ros.wire import Wire, stamp_ns
@@ -43,6 +43,7 @@ Part = tuple[str, list[Figure]]
 
 START = 2.0  # s of simulated time in a short run, whose cost is that of starting and stopping
 RATES = (31.25, 1000.0)  # Hz, at which latency is measured
+NUMBER = "position[0]"  # of a JointState's message
 RECORDED_RATE = 25_000.0  # Hz
 SETTLING = 30.0  # s within which two processes have to find each other
 
@@ -172,14 +173,14 @@ def _listen(connection: Connection) -> None:
 
     kind = conversions.message_class(JOINT_STATES.type)
     node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    keep_out_of_garbage_collection()
-    while not heard:
-        executor.spin_once(timeout_sec=0.1)
-    connection.send("heard")
-    while not connection.poll():
-        executor.spin_once(timeout_sec=0.1)
+    with make_executor() as executor:
+        executor.add_node(node)
+        keep_out_of_garbage_collection()
+        while not heard:
+            executor.spin_once(timeout_sec=0.1)
+        connection.send("heard")
+        while not connection.poll():
+            executor.spin_once(timeout_sec=0.1)
     connection.send(heard)
     node.destroy_node()
     rclpy.try_shutdown()
@@ -200,14 +201,14 @@ def _spread(seconds: Array) -> list[Figure]:
 def _jitter(bag: Path, seconds: float) -> list[Figure]:
     """Return how far the control period of the running graph is from 32 ms."""
     _run(Plan(bag=bag, trajectory="hold", duration=seconds + START, lockstep=False), "many")
-    (stamps,) = (
-        [message.stamp for message in messages]
-        for name, messages in bags.read(bag).items()
-        if name.endswith(VALVE_COMMAND.name)
-    )
-    first = stamps[0] + START * 1e9  # when everybody has started
-    periods = np.diff([stamp for stamp in stamps if stamp >= first])
+    stamps = _recorded(bag, VALVE_COMMAND.name, NUMBER).stamp
+    periods = np.diff(stamps[stamps >= stamps[0] + START * 1e9])  # when everybody has started
     return _spread(np.abs(periods - CONTROL_PERIOD_NS) * 1e-9)
+
+
+def _recorded(bag: Path, topic: str, path: str) -> Columns:
+    """Return one number of a topic's messages in a recording."""
+    return columns.read(bag, {f"/{topic}": [path]})[f"/{topic}"]
 
 
 @contextmanager
@@ -252,12 +253,12 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
     recorder.wait()
     node.destroy_node()
     rclpy.try_shutdown()
-    (recorded,) = bags.read(bag).values()
-    first = int(min(message.data.position[0] for message in recorded))
+    numbers = _recorded(bag, JOINT_STATES.name, NUMBER).values[NUMBER]
+    first = int(numbers.min())
     return f"Recorder, messages sent for {seconds:g} s", [
         Figure("sent", sent / now, "1/s"),
-        Figure("recorded", len(recorded) / now, "1/s"),
-        Figure("lost", float(sent - first - len(recorded)), "1"),
+        Figure("recorded", numbers.size / now, "1/s"),
+        Figure("lost", float(sent - first - numbers.size), "1"),
         Figure("sent before the first one recorded", float(first), "1"),
     ]
 

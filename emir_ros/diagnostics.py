@@ -60,7 +60,7 @@ class Diagnostics:
         self.figures: Callable[[], Mapping[str, str]] = dict
         self._said: tuple[Level, str] | None = None
         self._publisher = node.create_publisher(
-            DiagnosticArray, DIAGNOSTICS, qos.offered(lockstep=lockstep)
+            DiagnosticArray, DIAGNOSTICS, qos.offered(lockstep=True)
         )
         if not lockstep:
             node.create_timer(REPEAT, self._publish)

@@ -38,7 +38,7 @@ EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
 OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby", "autostart")
 ROBOT_FILES = ("robot_file", "machine_file")
-ROBOT_CONTROLLERS = ("cascade",)
+ROBOT_CONTROLLERS = ("cascade", "pfc")
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,8 @@ def _check_model(plan: Plan) -> None:
         raise ParameterError(f"model {plan.model!r}: there are {', '.join(MODELS)}")
     if plan.model == ROBOT:
         require_pinocchio()
+        if plan.switches:
+            raise ParameterError("switching: the whole robot keeps one controller")
     known = ROBOT_CONTROLLERS if plan.model == ROBOT else tuple(CONTROLLERS)
     for name in plan.controllers:
         if name not in known:

@@ -22,10 +22,12 @@ from emir_msgs_py.topics import (
 )
 from emir_plant import core
 from emir_plant.boom_urdf import bending, boom_urdf
+from emir_plant.parameters import Machine as JointParameters
 from emir_plant.parameters import cautions
 from emir_plant.plant import Plant
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.actuators import SIZE
+from emir_plant.robot.parameters import Robot
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros.node_parameters import declare, declare_robot, declare_tree
@@ -48,6 +50,7 @@ class Machine(Protocol):
 
     command: Topic
     plant: Any
+    state: Any
     truth: Any
 
     def step(self, commands: Signals, dt: float) -> None:
@@ -71,6 +74,24 @@ class Joint1Start:
         check_ranges(self)
 
 
+def declare_joint1(node: Node) -> JointParameters:
+    """Declare joint 1's file and parameters; return the machine as they set it up."""
+    sheet = declare(node, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
+    return declare_tree(node, load_sheet(Path(sheet)).machine if sheet else joint1())
+
+
+def declare_whole_robot(node: Node) -> Robot:
+    """Declare the robot's files and parameters; return it as they set it up."""
+    return declare_tree(node, declare_robot(node), without="main.")
+
+
+def robot_description(mechanics: Any) -> str:
+    """Return the robot as URDF, its root by the name that messages give the ground."""
+    from emir_plant.robot.urdf import urdf  # noqa: PLC0415 (needs Pinocchio)
+
+    return urdf(mechanics).replace('"world"', f'"{GROUND}"')
+
+
 class Joint1Machine:
     """Joint 1, boom stretched, set up by the node's parameters."""
 
@@ -78,9 +99,7 @@ class Joint1Machine:
 
     def __init__(self, node: Node, pressure_lowering: float) -> None:
         start = declare_tree(node, Joint1Start())
-        sheet = declare(node, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
-        base = load_sheet(Path(sheet)).machine if sheet else joint1()
-        self.plant = Plant(declare_tree(node, base))
+        self.plant = Plant(declare_joint1(node))
         for line in cautions(self.plant.machine):
             node.get_logger().warning(line)
         self.state = self.plant.initial(start.initial_angle, pressure_lowering)
@@ -122,11 +141,11 @@ class RobotMachine:
         require_pinocchio()
         from emir_analysis import robot_machine  # noqa: PLC0415 (needs Pinocchio)
         from emir_plant.robot.plant import RobotPlant  # noqa: PLC0415
-        from emir_plant.robot.urdf import joint_positions, urdf  # noqa: PLC0415
+        from emir_plant.robot.urdf import joint_positions  # noqa: PLC0415
 
         self._by_signals = robot_machine
         start = declare_tree(node, Start()).initial_angles
-        self.plant = RobotPlant(declare_tree(node, declare_robot(node), without="main."))
+        self.plant = RobotPlant(declare_whole_robot(node))
         for line in cautions(self.plant.robot.main):
             node.get_logger().warning(line)
         self.state = self.plant.initial(start.angles, pressure_lowering)
@@ -135,8 +154,7 @@ class RobotMachine:
         def positions() -> Signals:
             return joint_positions(mechanics, self.state[SIZE : SIZE + mechanics.size])
 
-        description = urdf(mechanics).replace('"world"', f'"{GROUND}"')  # as messages call it
-        self._picture = Picture(node, description, positions)
+        self._picture = Picture(node, robot_description(mechanics), positions)
         self.truth = self.plant.outputs(self.state)
 
     def step(self, commands: Signals, dt: float) -> None:

@@ -19,7 +19,7 @@ from emir_ros.shell import NodeError, Shell
 
 try:
     from rclpy.experimental import EventsExecutor
-except ImportError:  # an older Jazzy: everything works, lock step is slower
+except ImportError:  # an older Jazzy: everything works, but slower
     EventsExecutor = SingleThreadedExecutor
 
 QUIET = 0.2  # s without a message, after which all that was sent counts as received
@@ -48,14 +48,12 @@ def start_ros() -> StopRequest:
 
 
 @contextmanager
-def make_executor(*, fast: bool) -> Iterator[Any]:
-    """Give the executor to spin with `spin_once`.
+def make_executor() -> Iterator[Any]:
+    """Give the executor to spin with `spin_once`: the newer one, which has less to do per message.
 
-    fast: the newer one, which takes a tenth of the time for a message; for lock step and for a
-    node that hears everybody. It is shut down before the nodes and the context are: left over, it
-    may complain at exit.
+    It is shut down before the nodes and the context are: left over, it may complain at exit.
     """
-    executor: Any = EventsExecutor() if fast else SingleThreadedExecutor()
+    executor: Any = EventsExecutor()
     try:
         yield executor
     finally:
@@ -97,7 +95,7 @@ def _run(node_class: Callable[[], Shell]) -> int:
     try:
         stop = start_ros()
         node = node_class()
-        with make_executor(fast=node.lockstep or node.hears_everybody) as executor:
+        with make_executor() as executor:
             executor.add_node(node)
             keep_out_of_garbage_collection()
             while not (stop.made or node.done):

@@ -5,8 +5,10 @@ import re
 from functools import cache
 from pathlib import Path
 
-from ament_index_python.packages import get_package_share_directory
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from mcap.records import Schema
+
+from emir_common.quantity import ParameterError
 
 SEPARATOR = "=" * 80
 BUILTIN = re.compile(r"(bool|byte|char|u?int(8|16|32|64)|float(32|64)|w?string)\b")
@@ -39,15 +41,23 @@ def schema(type_name: str) -> Schema:
 def type_hash(type_name: str) -> str:
     """Return the RIHS01 hash of a type."""
     package, _, name = type_name.split("/")
-    path = Path(get_package_share_directory(package)) / "msg" / f"{name}.json"
+    path = _folder(package) / f"{name}.json"
     hashes = {entry["type_name"]: entry["hash_string"] for entry in
               json.loads(path.read_text())["type_hashes"]}  # fmt: skip
     return str(hashes[type_name])
 
 
 def _text(package: str, name: str) -> str:
-    path = Path(get_package_share_directory(package)) / "msg" / f"{name}.msg"
-    return path.read_text()
+    return (_folder(package) / f"{name}.msg").read_text()
+
+
+def _folder(package: str) -> Path:
+    try:
+        return Path(get_package_share_directory(package)) / "msg"
+    except PackageNotFoundError:
+        raise ParameterError(
+            f"package {package} is not in AMENT_PREFIX_PATH: is ROS 2 sourced?"
+        ) from None
 
 
 def _contained(package: str, name: str) -> list[tuple[str, str]]:

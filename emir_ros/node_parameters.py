@@ -1,11 +1,12 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
@@ -34,9 +35,26 @@ def declare_tree(node: Node, tree: Tree, without: str = "", live: Collection[str
         if value != default:
             values[path] = value
     try:
-        return with_values(tree, values)
+        result = with_values(tree, values)
     except ParameterError as error:
         raise ParameterError(f"{node.get_name()}: {error}") from None
+    for path, (about, default) in declared(tree).items():
+        _tell_range(node, path.removeprefix(without), about, default)
+    return result
+
+
+def _tell_range(node: Node, name: str, about: Quantity, default: Any) -> None:
+    """Put a quantity's range into its parameter's descriptor, where tools look for it.
+
+    Not when it is declared: rclpy would then refuse a value before we can say its unit.
+    """
+    descriptor = node.describe_parameter(name)
+    if type(default) is float:
+        span = FloatingPointRange(from_value=about.low, to_value=about.high, step=0.0)
+        descriptor.floating_point_range = [span]
+    elif type(default) is int:
+        low, high = math.ceil(about.low), math.floor(about.high)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
 
 
 def declare_robot(node: Node) -> Robot:

@@ -156,11 +156,19 @@ class PlantNode(Shell):
 
     def _start_realtime(self) -> None:
         self._command_received = -math.inf
-        self._started = time.monotonic()
         self._beat = Beat(PLANT_PERIOD_NS * 1e-9)
         self.diagnostics.figures = self._figures
+        self._compile()
         self._publish_sensors(self.get_clock().now().nanoseconds)
+        self._started = time.monotonic()
         self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
+
+    def _compile(self) -> None:
+        """Take a step that does not count: the very first compiles the machine, for seconds."""
+        machine = self.machine
+        state, truth = machine.state, machine.truth
+        machine.step(self._shut, PLANT_PERIOD_NS * 1e-9)
+        machine.state, machine.truth = state, truth
 
     def _figures(self) -> dict[str, str]:
         return self._beat.values() | pressures(self.machine.signals(self.tick))

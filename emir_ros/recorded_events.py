@@ -6,6 +6,7 @@ the run later, in the order of stamps and names: recordings of the same run are 
 
 import json
 from collections.abc import Callable, Collection
+from types import SimpleNamespace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,7 +17,7 @@ from emir_msgs_py.topics import DIAGNOSTICS, ORDERS
 from emir_ros import qos
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.shell import Shell
-from emir_ros.wire import stamp_ns
+from emir_ros.wire import as_cdr, stamp_ns
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 
@@ -39,6 +40,7 @@ class RecordedEvents:
         self._node, self._writer, self._nodes, self._write = node, writer, nodes, write
         self._waiting: list[tuple[int, bytes]] = []  # lock step: stamp, status
         self._orders = node.resolve_topic_name(ORDERS)
+        self._begin = node.now_ns()  # what was ordered before is told once more
         profile = qos.offered(lockstep=node.lockstep)
         node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_status, profile, raw=True)
         node.create_subscription(
@@ -58,7 +60,8 @@ class RecordedEvents:
 
     def _on_order(self, data: bytes) -> None:
         stamp = stamp_ns(data)
-        self._record(self._orders, data, self._log_time(stamp), stamp)
+        if self._node.lockstep or stamp >= self._begin:
+            self._record(self._orders, data, self._log_time(stamp), stamp)
 
     def _on_status(self, data: bytes) -> None:
         message: Any = deserialize_message(data, DiagnosticArray)
@@ -66,7 +69,7 @@ class RecordedEvents:
             return  # of another machine in this domain
         stamp = stamp_ns(data)
         if self._node.lockstep:
-            self._waiting.append((stamp, data))
+            self._waiting.append((stamp, as_cdr(TYPE, _plain(message))))  # the same every time
         else:
             self._record(DIAGNOSTICS, data, self._log_time(stamp), stamp)
 
@@ -79,3 +82,18 @@ class RecordedEvents:
             about = channel_metadata([qos.as_rosbag2(profile)], type_hash(TYPE))
             self._writer.add_topic(topic, schema(TYPE), about | {"fields": json.dumps({})})
         self._write(topic, data, log_time, publish_time)
+
+
+def _plain(message: Any) -> Any:
+    """Return the message with its levels as numbers, which the serializer wants."""
+    statuses = [
+        SimpleNamespace(
+            level=status.level[0],
+            name=status.name,
+            message=status.message,
+            hardware_id=status.hardware_id,
+            values=status.values,
+        )
+        for status in message.status
+    ]
+    return SimpleNamespace(header=message.header, status=statuses)

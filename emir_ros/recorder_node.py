@@ -20,7 +20,8 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Header, String
 
 from emir_analysis import parameter_files
-from emir_analysis.info import CHANGE, PARAMETERS, Change
+from emir_analysis.info import CHANGE, MACHINE, PARAMETERS, Change
+from emir_analysis.machine_record import PLANT, machine_record
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
@@ -51,7 +52,6 @@ from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import header_message, stamp_ns
 
-PLANT = "plant_node"  # tells the robot description
 EVENTS = 1000  # depth, as ROS has it for parameter events
 QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
@@ -213,6 +213,9 @@ class RecorderNode(Shell):
         if not self._answers or self._shape is None:
             return
         self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+        machine = machine_record(self._answers.get(PLANT, {}))
+        if machine:
+            self._writer.add_metadata(MACHINE, machine)
         for name, values in self._answers.items():
             self._attach_files(name, values)
         if self._shape:

@@ -110,7 +110,7 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
     stop = start_ros()
     nodes: dict[str, Shell] = {}
     try:
-        with make_executor(fast=plan.lockstep) as executor:
+        with make_executor() as executor:
             for name in plan.nodes:
                 nodes[name] = _node_class(name)(ros)
                 executor.add_node(nodes[name])

@@ -11,12 +11,12 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
 from emir_analysis.recorded_orders import SET
-from emir_analysis.switching import Selector, Switch
+from emir_analysis.switching import Choosing, Selector, Switch
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, reject_unknown
-from emir_ros.shell import ControlNode, Signals
+from emir_ros.shell import ControlNode
 
 
 class SelectorNode(ControlNode):
@@ -40,29 +40,29 @@ class SelectorNode(ControlNode):
             raise ParameterError(f"selector_node: {error}") from None
         about = f"which one drives, of {', '.join(names)}; may be set at any time"
         self.declare_parameter("controller", switched[0], ParameterDescriptor(description=about))
-        self._chosen: str = self.get_parameter("controller").value
-        self._check(self._chosen)
+        first: str = self.get_parameter("controller").value
+        self._check(first)
+        self.law: Choosing = Choosing(self.selector, first)
         self.add_on_set_parameters_callback(self._on_set)
-        self._ticks = 0
         reject_unknown(self)
         for name in names:
             self.take(OFFERED_COMMANDS[name])
 
-    def control(self, signals: Signals, dt: float) -> Signals:
-        """Return the command of the controller that is chosen."""
-        due = self.selector.due(self._ticks, dt)
-        if self._ticks and due != self.selector.due(self._ticks - 1, dt):
-            self._chosen = due
-        self._ticks += 1
-        return self.selector.selected(self._chosen, signals)
+    @property
+    def chosen(self) -> str:
+        """Return who drives."""
+        return self.state.name if self.state else self.law.first
+
+    def stale(self, missing: Sequence[str]) -> None:
+        """Publish nothing; who was chosen stays so."""
 
     def needed(self) -> Collection[str]:
         """Return the one command that matters; the others may be missing."""
-        return (OFFERED_COMMANDS[self._chosen].name,)
+        return (OFFERED_COMMANDS[self.chosen].name,)
 
     def status(self) -> str:
         """Return who drives."""
-        return f"{self._chosen} drives the machine"
+        return f"{self.chosen} drives the machine"
 
     def _check(self, name: str) -> None:
         if name not in self.selector.controllers:
@@ -76,8 +76,8 @@ class SelectorNode(ControlNode):
                     self._check(parameter.value)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self._chosen = parameter.value
-                self.orders.tell(SET, {"controller": self._chosen})
+                self.state = self.law.choose(self.state, parameter.value)
+                self.orders.tell(SET, {"controller": parameter.value})
         return SetParametersResult(successful=True)
 
 

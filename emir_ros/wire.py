@@ -108,15 +108,19 @@ def _double(value: float) -> bytes:
 
 
 def _serialized(topic: Topic, stamp: int, signals: Mapping[str, float]) -> bytes:
-    """Return the message by way of a file in memory, the serializer's public door."""
+    return as_cdr(topic.type, conversions.message(topic, stamp, signals))
+
+
+def as_cdr(type_name: str, message: Any) -> bytes:
+    """Return a message by way of a file in memory, the serializer's public door."""
     stream = BytesIO()
     writer = Writer(stream)
-    kind = writer.register_msgdef(topic.type, definition(topic.type))
-    writer.write_message(topic.name, kind, conversions.message(topic, stamp, signals))
+    kind = writer.register_msgdef(type_name, definition(type_name))
+    writer.write_message("message", kind, message)
     writer.finish()
     stream.seek(0)
-    ((_, _, message),) = make_reader(stream).iter_messages()
-    return message.data
+    ((_, _, written),) = make_reader(stream).iter_messages()
+    return written.data
 
 
 def _deserialized(topic: Topic, data: bytes) -> Any:

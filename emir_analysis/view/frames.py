@@ -11,6 +11,7 @@ from emir_analysis.signals import Recording
 
 Array = NDArray[np.float64]
 
+MOST_FRAMES = 100_000  # of a recording: 13 minutes of every sample, of an hour every fifth
 TIP_SLOPE = 4.0 / 3.0  # of a cantilever under its own weight: tip's angle by deflection and length
 
 
@@ -36,9 +37,15 @@ def tcp_deflection(tip_angle: float | Array, length: float) -> float | Array:
     return tip_angle * length / TIP_SLOPE
 
 
+def shown_times(run: Recording, signal: str) -> Array:
+    """Return the times of a signal's samples, s; of a long recording of some of them."""
+    time = run[signal].time
+    return time[:: 1 + time.size // MOST_FRAMES]
+
+
 def frames(run: Recording, length: float) -> list[Frame]:
-    """Return a frame for each sample of the machine. length: of the boom, m."""
-    time = run["stroke"].time
+    """Return a frame for each sample of the machine, up to MOST_FRAMES. length: of the boom, m."""
+    time = shown_times(run, "stroke")
     series = {
         "angle": _first(run, time, ("true_angle", "angle")),
         "tcp_deflection": _deflection(run, time, length),

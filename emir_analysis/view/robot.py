@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.run_signals import at
 from emir_analysis.signals import Recording
+from emir_analysis.view.frames import shown_times
 from emir_analysis.view.joint1 import BOOM, STRAIGHT, ball, polyline
 from emir_analysis.view.page import Chart
 from emir_control.arm import ArmParameters
@@ -51,8 +52,8 @@ def robot_frame(time: float, signals: dict[str, float]) -> Any:
 
 
 def robot_frames(run: Recording) -> list[Any]:
-    """Return a frame for each sample of the machine."""
-    time = run["joint1_stroke"].time
+    """Return a frame for each sample of the machine, up to MOST_FRAMES."""
+    time = shown_times(run, "joint1_stroke")
     columns = {name: at(run, name, time) for name in SIGNALS if name in run.signals}
     return [
         robot_frame(float(t), {name: float(column[k]) for name, column in columns.items()})

@@ -4,9 +4,11 @@ ros2 launch emir_ros emir.launch.py bag:=my_run controller:=cascade namespace:=a
 ros2 launch emir_ros emir.launch.py bag:=my_run model:=robot
 
 With `standby:=pfc` a second controller holds its state ready, and selector_node, whose parameter
-`controller` may be set at any time, chooses.
+`controller` may be set at any time, chooses. With `transforms:=true` robot_state_publisher gives
+the frames of all links, bent as the arm is, for RViz and Foxglove.
 """
 
+import sys
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -14,6 +16,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
 from launch.substitutions import (
+    Command,
     LaunchConfiguration,
     NotEqualsSubstitution,
     PythonExpression,
@@ -37,8 +40,9 @@ def generate_launch_description() -> LaunchDescription:
             _argument("controller", "cascade", "cascade, pfc, pfc_tip, lqg, mpc"),
             _argument("standby", "", "a second one beside it, to switch to; empty: none"),
             _argument("namespace", "", "namespace of all nodes and topics"),
-            _argument("model", "joint1", "joint1, or robot: the whole robot, with cascade"),
+            _argument("model", "joint1", "joint1, or robot: the whole robot, cascade or pfc"),
             _argument("params", parameters, "YAML file with the nodes' parameters"),
+            _argument("transforms", "false", "frames on /tf, by robot_state_publisher"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
             _node("force_loop_node", None, IfCondition(_gives_velocity(controller))),
@@ -46,7 +50,27 @@ def generate_launch_description() -> LaunchDescription:
             _node([second, "_node"], {"standby": True}, if_two),
             _node("selector_node", {"controller": controller}, if_two),
             _node("trajectory_node"),
+            _transforms(),
         ]
+    )
+
+
+def _transforms() -> Node:
+    """Return ROS's own node that turns description and joints into frames."""
+    words = [
+        f"{sys.executable} -P -m emir_ros.describe --ros-args -p model:=",
+        LaunchConfiguration("model"),
+        " --params-file ",
+        LaunchConfiguration("params"),
+    ]
+    return Node(
+        package="robot_state_publisher",
+        executable="robot_state_publisher",
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[{"robot_description": ParameterValue(Command(words), value_type=str)}],
+        remappings=[("joint_states", "description_joint_states")],
+        condition=IfCondition(LaunchConfiguration("transforms")),
+        output="screen",
     )
 
 

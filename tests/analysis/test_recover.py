@@ -14,6 +14,7 @@ from rosbags.highlevel import AnyReader
 from emir_analysis.cli import main
 from emir_analysis.errors import InputError
 from emir_analysis.recover import recover
+from emir_analysis.rosbag2_writer import CHUNK
 
 OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"
 
@@ -129,19 +130,19 @@ def test_info_says_what_was_cut_off(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_a_writer_killed_outright_loses_no_whole_chunk(tmp_path: Path) -> None:
-    """The writer is killed by SIGKILL after 400 messages of 1 kB, of which it may owe 64 KiB."""
+    """The writer is killed by SIGKILL after 1200 messages of 1 kB, of which it may owe a chunk."""
     script = (
         "import os, signal, sys; from pathlib import Path; from mcap.records import Schema;"
         "from emir_analysis.rosbag2_writer import Rosbag2Writer;"
         "w = Rosbag2Writer(Path(sys.argv[1]));"
         "w.add_topic('/a', Schema(0, b'byte[] data', 'ros2msg', 'x/msg/Bytes'), {});"
-        "[w.write('/a', bytes([k % 256]) * 1000, k, k) for k in range(400)];"
+        "[w.write('/a', bytes([k % 256]) * 1000, k, k) for k in range(1200)];"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", script, str(tmp_path / "bag")], check=False)
     assert not (tmp_path / "bag" / "metadata.yaml").exists()
     saved = recover(tmp_path / "bag", tmp_path / "whole")
-    assert 400 - 2 * 64 * 1024 / 1000 <= saved.messages <= 400
+    assert 1200 - 2 * CHUNK / 1000 <= saved.messages <= 1200
     with (tmp_path / "whole" / "whole_0.mcap").open("rb") as stream:
         messages = [message for _, _, message in make_reader(stream).iter_messages()]
     assert [m.data for m in messages] == [bytes([k % 256]) * 1000 for k in range(saved.messages)]

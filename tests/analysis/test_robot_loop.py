@@ -11,6 +11,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir
 from emir_analysis.robot_controls import (
     RobotCascadeControl,
     RobotForceLoopControl,
+    RobotPfcControl,
     RobotTrajectoryControl,
 )
 from emir_analysis.robot_machine import RobotLoop
@@ -19,14 +20,16 @@ from emir_analysis.robot_setup import (
     cascade_parameters,
     force_loops,
     path_parameters,
+    pfc_parameters,
     trajectory,
 )
 from emir_common.parameter_tree import with_values
 from emir_control.arm import Arm
 from emir_control.cascade import Cascade
+from emir_control.pfc import Pfc
 from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters
-from emir_msgs_py.robot_topics import JOINTS, ROBOT_TOPICS
+from emir_msgs_py.robot_topics import JOINTS, ROBOT_PFC_TERMS, ROBOT_TOPICS
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.posture import rest, rigid
 from emir_plant.robot.reach import PostureError
@@ -154,7 +157,21 @@ def test_a_joint_moves_alone_and_the_others_hold(number: int) -> None:
         stroke = signals[f"{joint}_true_stroke"]
         assert np.abs(stroke - stroke[0]).max() < 1.5e-3, joint
     assert signals["supply_pressure"].min() > 0.95 * ROBOT.main.supply.p0  # one pump for all
-    assert signals.keys() == {name for topic in ROBOT_TOPICS for name in topic.fields}
+    there = [topic for topic in ROBOT_TOPICS if topic is not ROBOT_PFC_TERMS]
+    assert signals.keys() == {name for topic in there for name in topic.fields}
+
+
+def test_predictive_control_of_all_joints_moves_one_and_holds_the_others() -> None:
+    """With the set point known ahead it rounds the ramps off, by 5 mm, and ends where it should."""
+    planned, _, inner = _loop("lift-lower").controls
+    loop = RobotLoop(PLANT, [planned, RobotPfcControl(Pfc(pfc_parameters())), inner])
+    signals = loop.run(START, 2e6, 8.0)
+    off = {j: signals[f"{j}_true_stroke"][::4] - signals[f"{j}_reference_stroke"] for j in JOINTS}
+    assert np.abs(off["joint1"]).max() < 7e-3
+    assert np.abs(off["joint1"][-31:]).max() < 2e-3
+    for joint in JOINTS[2:]:
+        assert np.abs(off[joint]).max() < 3e-3, joint
+    assert np.ptp(signals["joint1_velocity_command"]) < 0.035
 
 
 def test_sheet_makes_the_controllers_picture_of_each_cylinder() -> None:
@@ -198,3 +215,10 @@ def test_lines_that_cannot_be_are_refused(values: dict[str, float], said: str) -
     assert isinstance(control, RobotTrajectoryControl)
     with pytest.raises(PostureError.__base__, match=said):
         control.trajectory.initial(RobotTrajectoryInputs(START))
+
+
+def test_line_that_takes_more_than_the_shared_pump_gives_is_refused() -> None:
+    """Each valve has the flow; all together need 165 l/min."""
+    small = with_values(ROBOT, {"pump.flow_max": 1e-3})
+    with pytest.raises(PostureError.__base__, match=r"together .* l/min, the pump gives 60"):
+        trajectory(small, "line", MOVE, PATH).initial(RobotTrajectoryInputs(START))

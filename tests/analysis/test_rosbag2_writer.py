@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 
 from emir_analysis import bags
 from emir_analysis.info import info
-from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_analysis.rosbag2_writer import CHUNK, Rosbag2Writer
 from emir_common.quantity import ParameterError
 
 HEADER = Schema(
@@ -62,13 +62,13 @@ def test_a_recording_split_by_time_is_one_to_its_readers(compression: str, tmp_p
 
 
 def test_a_file_that_has_grown_to_its_size_is_followed_by_another(tmp_path: Path) -> None:
-    with Rosbag2Writer(tmp_path / "bag", max_size=300_000) as writer:
+    with Rosbag2Writer(tmp_path / "bag", max_size=1_200_000) as writer:
         writer.add_topic("/a", HEADER, {})
-        for k in range(1000):
+        for k in range(4000):
             writer.write("/a", bytes(1000), k, k)
     sizes = [file.stat().st_size for file in bags.files(tmp_path / "bag")]
-    assert len(sizes) == 4  # of a megabyte
-    assert max(sizes) < 300_000 + 2 * 64 * 1024 + 10_000  # a chunk, then the index
+    assert len(sizes) == 4  # of four megabytes
+    assert max(sizes) < 1_200_000 + 2 * CHUNK + 10_000  # a chunk, then the index
 
 
 def test_zstd_is_smaller_and_the_same(tmp_path: Path) -> None:

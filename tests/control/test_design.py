@@ -7,6 +7,7 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
+from scipy import linalg
 
 from emir_common.quantity import ParameterError
 from emir_control import design, pfc_file
@@ -198,3 +199,13 @@ def test_a_bad_file_is_one_clear_line(case: str, tmp_path: Path) -> None:
         pfc_file.load(file, "stroke")
     assert str(caught.value).startswith(f"{file}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_badly_scaled_model_with_poles_all_but_alike_is_reduced_without_loss() -> None:
+    """As an identified one of too high an order: a companion form, three poles at 0.98."""
+    poles = np.poly([1.0, 0.98, 0.98, 0.98 - 1e-7, 0.94 + 0.2j, 0.94 - 0.2j]).real
+    zeros = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    model = InternalModel(linalg.companion(poles), np.eye(6)[0], zeros, 0.032)
+    found = design.reduced(model, 6)
+    for steps in (1, 20, 100):
+        assert found.held_response(steps) == pytest.approx(model.held_response(steps), rel=1e-3)

@@ -15,6 +15,7 @@ from emir_analysis.design_pfc import (
     DesignTask,
     OperatingPoint,
     design_pfc,
+    pump_is_short,
     stability_map,
 )
 from emir_analysis.node_controls import PfcControl, PfcTipControl
@@ -153,10 +154,22 @@ def test_the_heavy_and_steep_corner_is_stable_with_it_and_comes_to_rest() -> Non
 
 
 def test_map_of_the_schedule_between_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the pump is all but short of pressure, too: 30 to 38 deg with 1250 kg."""
     from emir_analysis import design_pfc
 
-    monkeypatch.setattr(design_pfc, "FINE_ANGLES", tuple(np.radians([52.5, 75.0])))
+    monkeypatch.setattr(design_pfc, "FINE_ANGLES", tuple(np.radians([30.0, 37.5, 75.0])))
     monkeypatch.setattr(design_pfc, "FINE_PAYLOADS", (0.0, 1250.0))
-    found = stability_map(joint1(), "pfc", GIVEN)
-    assert found.worst < 1.0
-    assert found.radius[0.01].shape == (2, 2)
+    tip = pfc_file.load(pfc_file.find(SCHEDULED, TIP_ANGLE), TIP_ANGLE)
+    for controller, parameters in (("pfc", GIVEN), ("pfc_tip", tip)):
+        found = stability_map(joint1(), controller, parameters)
+        assert found.worst < 1.0, controller
+        assert found.radius[0.01].shape == (2, 3)
+
+
+def test_pump_is_short_where_the_load_takes_its_pressure() -> None:
+    """The fully open valve cannot have the balance's drop: 1500 kg at 30 deg, not at 60."""
+    for degrees, short in ((30.0, True), (60.0, False)):
+        point = OperatingPoint(angle=math.radians(degrees), payload=1500.0)
+        assert pump_is_short(joint1(), point) is short
+        plenty = with_values(joint1(), {"supply.p0": 300e5})
+        assert not pump_is_short(plenty, point)

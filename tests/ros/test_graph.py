@@ -23,7 +23,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.info import info, parameters_text
+from emir_analysis.info import info, parameters_text, text
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
@@ -166,7 +166,7 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
                 for _, message in recorded[f"/{topic.name}"]
             ]
             assert np.array_equal(values, expected[name]), name
-    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "force_loop"):
+    for node in ("trajectory", "cascade", "pfc", "pfc_tip", "selector", "force_loop"):
         assert same(replay(bag, node, {})), node
 
 
@@ -366,7 +366,10 @@ def test_a_recording_is_never_overwritten(
 def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) -> None:
     """Parameters as set and as left alone, and what every field means."""
     file, bag = tmp_path / "params.yaml", tmp_path / "run"
-    file.write_text("cascade_node: {ros__parameters: {gain: 1.5}}\n")
+    file.write_text(
+        "cascade_node: {ros__parameters: {gain: 1.5}}\n"
+        "plant_node: {ros__parameters: {effects.payload.mass: 500.0, sensors.seed: 7}}\n"
+    )
     words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(bag)]) == 0
     with (bag / "run_0.mcap").open("rb") as stream:
@@ -378,6 +381,8 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     assert parameters["cascade_node"]["gain"] == 1.5
     assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
     assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
+    assert stored["emir.machine"] == {"effects": "payload mass = 500 kg", "seed": "7"}
+    assert {"effects: payload mass = 500 kg", "seed: 7"} <= set(text(info(bag)).splitlines())
     for channel in summary.channels.values():
         if channel.topic == DIAGNOSTICS:
             continue

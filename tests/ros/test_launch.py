@@ -35,7 +35,11 @@ def launch(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
 
 
 def test_every_executable_is_started(launch: MagicMock) -> None:
-    started = {"".join(call.kwargs["executable"]) for call in launch.Node.call_args_list}
+    started = {
+        "".join(call.kwargs["executable"])
+        for call in launch.Node.call_args_list
+        if call.kwargs["package"] == "emir_ros"
+    }
     executables = {path.name for path in EXECUTABLES.glob("*_node")}
     outer = {f"{name}_node" for name in ("cascade", "pfc", "pfc_tip", "lqg", "mpc")}
     beside = {"replay_node", "view_node"}  # for those who look at it
@@ -46,9 +50,25 @@ def test_every_executable_is_started(launch: MagicMock) -> None:
 
 def test_every_configuration_is_a_declared_argument(launch: MagicMock) -> None:
     declared = {call.args[0] for call in launch.DeclareLaunchArgument.call_args_list}
-    assert declared == {"bag", "controller", "model", "standby", "namespace", "params"}
-    used = str(launch.Node.call_args_list)
+    wanted = {"bag", "controller", "model", "standby", "namespace", "params", "transforms"}
+    assert declared == wanted
+    used = str([*launch.Node.call_args_list, *launch.IfCondition.call_args_list])
     assert all(f"<{name}>" in used for name in declared)
+
+
+def test_frames_come_of_the_bent_description(launch: MagicMock) -> None:
+    """robot_state_publisher wants a parameter and listens to joint_states."""
+    (state_publisher,) = [
+        call.kwargs
+        for call in launch.Node.call_args_list
+        if call.kwargs["package"] == "robot_state_publisher"
+    ]
+    assert state_publisher["remappings"] == [("joint_states", "description_joint_states")]
+    (parameters,) = state_publisher["parameters"]
+    assert set(parameters) == {"robot_description"}
+    (command,) = launch.Command.call_args_list
+    words = "".join(command.args[0]).split()
+    assert words[1:4] == ["-P", "-m", "emir_ros.describe"]
 
 
 def test_parameter_file_is_installed(launch: MagicMock) -> None:

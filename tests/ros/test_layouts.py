@@ -8,7 +8,9 @@ from xml.etree import ElementTree as ET
 import yaml
 
 from emir_msgs_py.robot_topics import TCP_POSE
-from emir_msgs_py.topics import JOINT_STATE, TOPICS, Topic, by_name
+from emir_msgs_py.topics import DIAGNOSTICS, JOINT_STATE, TOPICS, Topic, by_name
+
+DESCRIPTION = "robot_description"  # as ROS has it
 
 LAYOUTS = Path(__file__).parents[2] / "emir_ros" / "layouts"
 
@@ -35,6 +37,17 @@ def test_foxglove_plots_what_is_published() -> None:
     for path in paths:
         topic, _, field = path.removeprefix("/").partition(".")
         assert field in {known.path for known in by_name(topic).fields.values()}
+
+
+def test_arm_and_status_are_looked_for_where_they_are() -> None:
+    """What no table of signals has: the description, and what nodes say of themselves."""
+    panels = json.loads((LAYOUTS / "foxglove.json").read_text())["configById"]
+    assert set(panels["3D!arm"]["topics"]) == {f"/{DESCRIPTION}"}
+    assert panels["DiagnosticSummary!nodes"]["topicToRender"] == DIAGNOSTICS
+    manager = yaml.safe_load((LAYOUTS / "emir.rviz").read_text())["Visualization Manager"]
+    (model,) = [d for d in manager["Displays"] if d["Class"].endswith("/RobotModel")]
+    assert model["Description Topic"]["Value"] == f"/{DESCRIPTION}"
+    assert model["Description Topic"]["Durability Policy"] == "Transient Local"
 
 
 def test_foxglove_names_the_units_of_what_it_plots() -> None:

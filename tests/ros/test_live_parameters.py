@@ -18,7 +18,9 @@ from emir_msgs_py.topics import CASCADE_TERMS, CONTROL_PERIOD_NS
 from emir_ros.cascade_node import CascadeNode
 from emir_ros.force_loop_node import ForceLoopNode
 from emir_ros.pfc_node import PfcNode
+from emir_ros.plant_node import PlantNode
 from emir_ros.recorder_node import RecorderNode
+from emir_ros.trajectory_node import TrajectoryNode
 
 DT = CONTROL_PERIOD_NS * 1e-9
 SIGNALS = {"reference_stroke": 0.31, "reference_velocity": 0.0, "stroke": 0.3}
@@ -52,11 +54,12 @@ def test_a_gain_is_in_force_from_the_next_period_and_the_state_is_kept() -> None
 @pytest.mark.parametrize(
     ("make", "name", "value", "reason"),
     [
-        (CascadeNode, "gain", 99.0, r"gain = 99: outside 0 ... 50 1/s"),
-        (CascadeNode, "time_constant", float("nan"), r"time_constant = nan: outside"),
-        (ForceLoopNode, "gain", -1.0, r"gain = -1: outside 0 ... 1e-05 m/\(s N\)"),
+        (CascadeNode, "gain", 99.0, r"gain out of range Min: 0.0, Max: 50.0, value: 99.0"),
+        (CascadeNode, "gain", 99, r"gain = 99: outside 0 ... 50 1/s"),
+        (CascadeNode, "time_constant", float("nan"), r"time_constant out of range"),
+        (ForceLoopNode, "gain", -1.0, r"gain out of range Min: 0.0, Max: 1e-05, value: -1.0"),
         (ForceLoopNode, "prefilter.dead_zone", 0.0, "read-only"),
-        (PfcNode, "response_time", 0.0, "response_time = 0: outside 0.05 ... 20 s"),
+        (PfcNode, "response_time", 0.0, "response_time out of range Min: 0.05, Max: 20.0"),
         (PfcNode, "error_window", 3, "read-only"),
     ],
 )
@@ -68,6 +71,27 @@ def test_what_cannot_be_set_is_refused_with_the_reason(
     with pytest.raises(AssertionError, match=reason):
         assert _set(node, name, value) == ""
     assert node.get_parameter(name).value == before
+    node.destroy_node()
+
+
+@pytest.mark.parametrize("make", [CascadeNode, ForceLoopNode, PfcNode, PlantNode, TrajectoryNode])
+def test_tools_are_told_meaning_unit_and_range(make: Callable[[], Node]) -> None:
+    """What `ros2 param describe` and sliders show; of every number but the node's own few."""
+    node = make()
+    names = node.list_parameters([], 0).names
+    described = {name: node.describe_parameter(name) for name in names}
+    own = {"use_sim_time", "start_type_description_service"}
+    assert all(d.description for name, d in described.items() if name not in own)
+    numbers = {
+        name: d
+        for name, d in described.items()
+        if isinstance(node.get_parameter(name).value, float) and name != "input_timeout"
+    }
+    assert numbers
+    for name, descriptor in numbers.items():
+        (span,) = descriptor.floating_point_range
+        assert span.from_value <= node.get_parameter(name).value <= span.to_value
+        assert f"{span.from_value:g} ... {span.to_value:g}" in descriptor.description
     node.destroy_node()
 
 

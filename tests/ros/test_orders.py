@@ -1,5 +1,6 @@
 """What is ordered or set during a run in lock step is recorded with its period, and replayed."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from emir_analysis.replay import replay
 from emir_analysis.rosbag2_writer import Rosbag2Writer
 from emir_analysis.run_signals import load_run
 from emir_analysis.stamped import same
+from emir_analysis.switching import Switch
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, ROBOT
 from emir_ros.graph import Plan, ros_arguments
 from emir_ros.main import make_executor
@@ -88,7 +90,7 @@ class Run:
 
     def run(self) -> Path:
         """Run to the end; returns the recording."""
-        with ros_arguments(self._plan) as words, make_executor(fast=True) as executor:
+        with ros_arguments(self._plan) as words, make_executor() as executor:
             try:
                 for name in self._plan.nodes:
                     self.nodes[name] = _node_class(name)(words)
@@ -123,7 +125,9 @@ class Run:
             executor.add_node(plant)
 
 
-def test_orders_and_settings_replay_bit_for_bit(tmp_path: Path) -> None:
+def test_orders_and_settings_replay_bit_for_bit(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     run = Run(Plan(tmp_path / "run", duration=9.6))
     run.at(1.6, run.set("cascade_node", "gain", 1.0))
     run.at(1.8, run.set("force_loop_node", "gain", 5e-8))
@@ -143,8 +147,26 @@ def test_orders_and_settings_replay_bit_for_bit(tmp_path: Path) -> None:
     assert np.abs(recorded.value[recorded.time > 8.5]).max() > 0.02  # started anew
     for node in ("trajectory", "cascade", "force_loop", "plant"):
         assert same(replay(bag, node, {})), node
+    capfd.readouterr()
+    assert main(["replay", str(bag), "--node", "cascade"]) == 0
+    first = capfd.readouterr().out.splitlines()[0]
+    assert re.fullmatch(r"from 1\.\d+ s: set gain = 1\.0", first)
     unheard = _without(bag, tmp_path / "unheard", "/orders")
     assert not same(replay(unheard, "trajectory", {}))
+
+
+def test_a_switch_by_hand_replays_bit_for_bit(tmp_path: Path) -> None:
+    """Planned to pfc, by hand back to cascade: the selector and those whom it tells."""
+    plan = Plan(tmp_path / "run", duration=3.2, switches=(Switch(1.6, "pfc"),))
+    run = Run(plan)
+    run.at(2.2, run.set("selector_node", "controller", "cascade"))
+    bag = run.run()
+    (order,) = orders(bag, "selector_node")
+    for node in ("trajectory", "cascade", "pfc", "selector", "force_loop", "plant"):
+        assert same(replay(bag, node, {})), node
+    active = {f.name: f for f in replay(bag, "selector", {})}["cascade_active"].recorded
+    after = order.stamp // CONTROL_PERIOD_NS
+    assert active.tolist() == [1.0] * 50 + [0.0] * (after - 50) + [1.0] * (len(active) - after)
 
 
 def test_what_was_set_without_its_period_is_refused(

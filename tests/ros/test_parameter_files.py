@@ -41,3 +41,24 @@ def test_a_replay_elsewhere_takes_design_and_machine_from_the_recording(tmp_path
     assert same(replay(bag, "pfc", {}))
     assert same(replay(bag, "plant", {}))
     assert not same(replay(bag, "pfc", {"model_file": "", "response_time": 1.5}))
+
+
+def test_the_projects_own_design_is_kept_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another version may come with another one."""
+    bag = tmp_path / "run"
+    file = tmp_path / "params.yaml"
+    file.write_text("pfc_node: {ros__parameters: {model_file: scheduled}}\n")
+    words = ["--controller", "pfc", "--params", str(file), "--duration", "2.4"]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    replaced = tmp_path / pfc_file.find(pfc_file.SCHEDULED, pfc_file.STROKE).name
+    shutil.copy(pfc_file.default_file(pfc_file.STROKE), replaced)  # which follows nothing
+    find = pfc_file.find
+    monkeypatch.setattr(
+        pfc_file,
+        "find",
+        lambda name, output: replaced if name == "scheduled" else find(name, output),
+    )
+    assert same(replay(bag, "pfc", {}))
+    assert not same(replay(bag, "pfc", {"model_file": "scheduled"}))

@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from emir_plant.boom_urdf import boom_urdf
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
-from emir_ros import qos
+from emir_ros import describe, qos
 from emir_ros.plant_node import PlantNode
 from emir_ros.run import main as run_graph
 
@@ -86,3 +86,34 @@ def test_a_recording_keeps_the_description(processes: str, tmp_path: Path) -> No
         (attachment,) = make_reader(stream).iter_attachments()
     assert attachment.name == "robot_description.urdf"
     assert attachment.data.decode() == boom_urdf(Plant(joint1()).machine.geometry)
+
+
+@pytest.mark.parametrize("model", ["joint1", "robot"])
+def test_the_description_is_printed_as_the_plant_publishes_it(
+    model: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """For robot_state_publisher, which wants it as a parameter before anything runs."""
+    if model == "robot":
+        pytest.importorskip("pinocchio", reason="pip install 'emir_ros[robot]'")
+    file = tmp_path / "params.yaml"
+    file.write_text("/**/plant_node: {ros__parameters: {geometry.boom_length: 20.0}}\n")
+    words = ["--ros-args", "-p", f"model:={model}", "--params-file", str(file)]
+    assert describe.main(words) == 0
+    printed = capfd.readouterr().out.strip()
+    rclpy.init()
+    listener, heard = Node("rviz"), []
+    listener.create_subscription(
+        String, "robot_description", lambda m: heard.append(m.data), qos.latched()
+    )
+    plant, executor = PlantNode(words), SingleThreadedExecutor()
+    try:
+        executor.add_node(listener)
+        for _ in range(2000):
+            executor.spin_once(timeout_sec=0.1)
+            if heard:
+                break
+    finally:
+        for node in (listener, plant):
+            node.destroy_node()
+        rclpy.shutdown()
+    assert heard == [printed]

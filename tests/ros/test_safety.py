@@ -178,6 +178,28 @@ def test_a_controller_restarted_while_it_moves_takes_the_motion_up_again() -> No
         assert heard[first + 1] < 1.0  # not at full stroke at once
 
 
+@pytest.mark.parametrize(
+    ("victim", "again"), [("trajectory_node", TrajectoryNode), ("force_loop_node", ForceLoopNode)]
+)
+def test_any_other_node_restarted_while_it_moves_takes_the_motion_up_again(
+    victim: str, again: Callable[[], Node]
+) -> None:
+    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
+    with _graph(*makes) as graph:
+
+        def spool() -> float:
+            return ([0.0, *graph.listener.of(TRUTH)])[-1]
+
+        graph.until(_moves(graph), "the machine does not move")
+        graph.until(lambda: spool() > 0.2, "the spool does not move")
+        graph.lose(next(node for node in graph.nodes if node.get_name() == victim))
+        graph.until(lambda: abs(spool()) < 0.01, "the valve stays open")
+        before = len(graph.listener.of(VALVE_COMMAND))
+        graph.add(again())
+        graph.until(lambda: spool() > 0.2, "it does not go on")
+        assert max(graph.listener.of(VALVE_COMMAND)[before:]) < 1.0  # not at full stroke at once
+
+
 def test_a_dead_force_loop_shuts_the_valve_in_the_machine() -> None:
     makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
     with _graph(*makes) as graph:

@@ -1,7 +1,9 @@
 """`emir view --live`: what is published is what the page shows."""
 
+import itertools
 import math
 import socket
+import threading
 import time
 from collections.abc import Iterator
 
@@ -10,12 +12,18 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("viser", reason="needs the extra `view`")
 
+pytest.importorskip("playwright", reason="needs playwright and a browser")
+
 import rclpy
+from browser import page
 from rclpy.executors import SingleThreadedExecutor
 
+from emir_analysis.view.robot import TOPICS as ROBOT_LIVE
 from emir_common.quantity import ParameterError
-from emir_msgs_py.topics import CYLINDER_STATES, JOINT_STATES, PRESSURE_LIFTING
+from emir_msgs_py.robot_topics import JOINTS
+from emir_msgs_py.topics import CYLINDER_STATES, JOINT1, JOINT_STATES, PRESSURE_LIFTING, ROBOT
 from emir_ros.shell import Shell
+from emir_ros.view_node import SHOWN as LIVE
 from emir_ros.view_node import ViewNode
 
 SENT = [JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING]
@@ -51,6 +59,62 @@ def test_the_page_shows_what_is_published(port: int) -> None:
     assert f"| joint angle | {math.degrees(0.8):.2f} | deg |" in view.shown
     assert "| valve | - | % |" in view.shown  # nobody publishes it
     view.close()
+
+
+SHOWN = {
+    JOINT1: (list(LIVE), {"angle": 0.8, "stroke": 0.3}, "joint angle"),
+    ROBOT: (
+        list(ROBOT_LIVE),
+        {f"{joint}_angle": 0.8 if joint == "joint1" else -0.1 for joint in JOINTS},
+        "joint1",
+    ),
+}
+
+
+@pytest.mark.parametrize("model", SHOWN)
+def test_a_browser_shows_the_running_graph(port: int, model: str) -> None:
+    """What changes in the graph changes on the open page, and its controls do not stop it."""
+    topics, given, name = SHOWN[model]
+    everything = {signal: 0.1 for topic in topics for signal in topic.fields} | given
+    view_node = ViewNode(["--ros-args", "-p", f"port:={port}", "-p", f"model:={model}"])
+    machine = Shell("machine", topics)
+    executor = SingleThreadedExecutor()
+    for node in (view_node, machine):
+        executor.add_node(node)
+    stamp = itertools.count(0, 8_000_000)
+
+    def publish() -> None:
+        now = next(stamp)
+        for topic in topics:
+            machine.publish(topic, now, everything)
+
+    machine.create_timer(0.02, publish)
+    over = threading.Event()
+
+    def spin() -> None:
+        while not over.is_set():
+            executor.spin_once(timeout_sec=0.05)
+
+    spinning = threading.Thread(target=spin)
+    spinning.start()
+    try:
+        with page() as view:
+            view.goto(f"http://localhost:{port}")
+            row = view.locator("tr", has=view.get_by_text(name, exact=True))
+            row.get_by_text(f"{math.degrees(0.8):.2f}").wait_for()
+            assert view.locator("canvas").count() >= 5  # the arm and the plots
+            everything.update({key: 0.9 for key, value in given.items() if value == 0.8})
+            row.get_by_text(f"{math.degrees(0.9):.2f}").wait_for()
+            entry = view.locator("input[type=text]").first  # beside the bending's slider
+            entry.fill("20")
+            entry.press("Enter")
+            everything.update({key: 1.0 for key, value in given.items() if value == 0.8})
+            row.get_by_text(f"{math.degrees(1.0):.2f}").wait_for()  # it still goes on
+    finally:
+        over.set()
+        spinning.join()
+        view_node.close()
+        executor.shutdown()
 
 
 def test_a_port_that_is_taken_is_told(port: int) -> None:

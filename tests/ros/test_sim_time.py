@@ -1,0 +1,90 @@
+"""Nodes in real time on the /clock of a recording: its pace is theirs, and its pauses."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from emir_msgs_py.conversions import stamp_ns
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, VELOCITY_COMMAND
+from emir_ros.cascade_node import CascadeNode
+from emir_ros.replay_node import ReplayNode
+
+OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"  # 3.2 s
+END = 3_200_000_000  # ns
+
+
+@pytest.fixture(autouse=True)
+def ros(ros_domain: int) -> Iterator[None]:
+    rclpy.init()
+    yield
+    rclpy.shutdown()
+
+
+def _words(**parameters: Any) -> list[str]:
+    pairs = [("-p", f"{name}:={value}") for name, value in parameters.items()]
+    return ["--ros-args", *(word for pair in pairs for word in pair)]
+
+
+def test_a_controller_lives_in_the_recordings_time() -> None:
+    """Renamed and in a namespace as well; in its own time the inputs would be stale at once."""
+    topics = "['/cylinder_reference','/cylinder_states']"
+    replay = ReplayNode(
+        [*_words(bag=OWN_BAG, topics=topics, rate=0.5, start_paused="true"), "-r", "__ns:=/left"]
+    )
+    cascade = CascadeNode(
+        [
+            *_words(use_sim_time="true"),
+            "-r",
+            "__ns:=/left",
+            "-r",
+            f"{VELOCITY_COMMAND.name}:=wanted/speed",
+        ]
+    )
+    listener, stamps = Node("listener"), []
+    listener.create_subscription(
+        JointState, "/left/wanted/speed", lambda m: stamps.append(stamp_ns(m)), 100
+    )
+    nodes = (replay, cascade, listener)
+    executor = SingleThreadedExecutor()
+    for node in nodes:
+        executor.add_node(node)
+
+    def until(condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.01)
+
+    try:
+        until(lambda: cascade.count_publishers("/left/cylinder_reference") == 1)
+        until(lambda: cascade.count_subscribers("/left/wanted/speed") == 1)
+        assert not stamps  # the clock stands still
+        replay._paused = False
+        until(lambda: len(stamps) >= 3)
+        replay._paused = True
+        for _ in range(50):
+            executor.spin_once(timeout_sec=0.01)
+        standing = len(stamps)
+        for _ in range(50):
+            executor.spin_once(timeout_sec=0.01)
+        assert len(stamps) == standing
+        replay._paused = False
+        until(lambda: replay.done)
+        replay.check()
+        assert len(stamps) > standing
+        assert stamps[0] > 0
+        assert stamps[-1] < END + 10 * CONTROL_PERIOD_NS
+        assert stamps == sorted(stamps)
+    finally:
+        for node in nodes:
+            node.destroy_node()

@@ -1,5 +1,6 @@
 """The report of an actuator's diagnosis as a page, and its pictures."""
 
+import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -13,6 +14,7 @@ from emir_analysis.signals import Array
 COLOURS = {"nominal": "#b9c2cb", "refitted": "#e8963a", "black_box": "#7a9e3b",
            "with_effect": "#0b6bb5"}  # fmt: skip
 MEASURED = "#1d2733"
+SHOWN = 12  # candidates on the page; the JSON has all
 
 
 def write_page(
@@ -29,6 +31,8 @@ def write_page(
         for e in result.effects
         for name, p in e.parameters.items()
     ]
+    closest = sorted(result.candidates, key=lambda c: math.inf if c.unseen is None else c.unseen)
+    closest = closest[:SHOWN]
     blocks: list[Block] = [
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
@@ -57,8 +61,9 @@ def write_page(
         Heading("What was tried"),
         Table(
             ("effects", "better by", "error on parts left out"),
-            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in result.candidates],
-            "Bayesian information criterion over that of parameters only; another 6 are strong.",
+            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in closest],
+            "better by: Bayesian information criterion, over parameters only; 6 are strong. The"
+            f" {len(closest)} closest of {len(result.candidates)} that were tried.",
         ),
         Heading("Parameters"),
         Table(

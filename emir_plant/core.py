@@ -119,7 +119,12 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
 @compiled
 def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
     """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
-    p = parameters[0]
+    write_derivative_of(x, command, parameters[0], dx)
+
+
+@compiled
+def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
+    """As `write_derivative`, with the parameters of one machine."""
     motion = _motion(x, p)
     dry = terms.dry_friction(motion.joint_velocity, motion.force, p)
     _write_rates(x, command, motion, dry, p, dx)
@@ -187,7 +192,12 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
 @compiled
 def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     """Return what an ideal observer would read off the state."""
-    p = parameters[0]
+    return truth_of(x, parameters[0])
+
+
+@compiled
+def truth_of(x: Array, p: Any) -> Truth:
+    """As `truth`, with the parameters of one machine."""
     motion = _motion(x, p)
     flow_lifting, flow_lowering, _ = _valve_flows(x, p)
     bending = 0.0
@@ -300,10 +310,10 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
 
 
 @compiled_parallel
-def simulate_many(
+def simulate_each(
     starts: Array, commands: Array, dt: float, every: int, parameters: NDArray[Any]
 ) -> Array:
-    """Run m machines under the same commands, in parallel.
+    """Run m machines under the same commands, one by one on each core.
 
     starts: (m, n) states; parameters: (m,) records. Returns (m, 1 + k // every, len(Truth)).
     """

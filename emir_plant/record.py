@@ -8,8 +8,14 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import quantities
 from emir_plant.boom import BoomModes, boom_modes
+from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine, groups
+
+EFFECT_FIELDS = tuple(
+    f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)
+)
+EFFECT_SIZES = tuple(f"{effect}_{size}" for effect, kind in REGISTRY.items() for size in kind.sizes)
 
 
 def record(machine: Machine) -> NDArray[Any]:

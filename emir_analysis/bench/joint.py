@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.integrate import odeint
 
 from emir_analysis.bench.timing import Contender, Figure, durations, rates
-from emir_plant import core
+from emir_plant import core, lanes
 from emir_plant.core import LOGIC, MODES, P_H, P_S, SPOOL, Truth
 from emir_plant.jit import compiled
 from emir_plant.plant import Plant
@@ -177,10 +177,11 @@ def joint_figures(seconds: float) -> Iterator[tuple[str, list[Figure]]]:
     task = Task(Plant(joint1()))
     with plain_c(task.plant) as c:
         yield f"Joint 1 at a relative error of {ERROR:g}, one core", _solvers(task, c, seconds)
-    state = task.start
-    title = "One step() of 1 ms from Python, outputs included"
-    yield title, durations("step", lambda: task.plant.step(state, 0.5, 1e-3), seconds)
-    yield f"Joints or runs at a time, steps of {core.STEP * 1e3:g} ms", _growth(task, seconds)
+        state = task.start
+        title = "One step() of 1 ms from Python, outputs included"
+        yield title, durations("step", lambda: task.plant.step(state, 0.5, 1e-3), seconds)
+        title = f"Joints or runs at a time, steps of {core.STEP * 1e3:g} ms"
+        yield title, _growth(task, c, seconds)
 
 
 def _solvers(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
@@ -220,12 +221,21 @@ def _loosest(
     raise ArithmeticError(f"no setting of {settings} reaches an error of {ERROR}")
 
 
-def _growth(task: Task, seconds: float) -> list[Figure]:
-    """Return how the speed grows with the number of machines, on one core and on all."""
+def _growth(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
+    """Return how the speed grows with the number of machines, on one core and on all.
+
+    Beside plain C on one core, which does one after the other.
+    """
     contenders = []
+    if c is not None:
+
+        def by_c() -> Array:
+            return c.simulate(task.small_start, task.commands, core.STEP)
+
+        contenders.append(Contender("plain C without effects", by_c, task.duration))
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
     for threads in dict.fromkeys((1, most)):
-        for number in (1, 2, 4, 6, 16):
+        for number in (1, 2, 4, 6, 8, 16, 32):
             starts = np.tile(task.start, (number, 1))
             machines = np.tile(task.plant.record, number)
             name = f"{number} on {threads} core{'s' if threads > 1 else ''}"
@@ -240,6 +250,6 @@ def _growth(task: Task, seconds: float) -> list[Figure]:
 def _many(starts: Array, commands: Array, machines: NDArray[Any], threads: int) -> Run:
     def run() -> Array:
         numba.set_num_threads(threads)
-        return core.simulate_many(starts, commands, SAMPLE, 1, machines)
+        return lanes.simulate_many(starts, commands, SAMPLE, 1, machines)
 
     return run

@@ -6,7 +6,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.signals import Array
-from emir_plant import core
+from emir_plant import lanes
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import readings, undistorted
@@ -29,7 +29,7 @@ def free_runs(
     result = np.full((len(plants), experiment.angle.size, len(SHOWN)), np.nan)
     if not able:
         return result
-    truths = core.simulate_many(
+    truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
         experiment.commands,
         COMMAND_STEP,

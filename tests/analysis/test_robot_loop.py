@@ -215,3 +215,10 @@ def test_lines_that_cannot_be_are_refused(values: dict[str, float], said: str) -
     assert isinstance(control, RobotTrajectoryControl)
     with pytest.raises(PostureError.__base__, match=said):
         control.trajectory.initial(RobotTrajectoryInputs(START))
+
+
+def test_line_that_takes_more_than_the_shared_pump_gives_is_refused() -> None:
+    """Each valve has the flow; all together need 165 l/min."""
+    small = with_values(ROBOT, {"pump.flow_max": 1e-3})
+    with pytest.raises(PostureError.__base__, match=r"together .* l/min, the pump gives 60"):
+        trajectory(small, "line", MOVE, PATH).initial(RobotTrajectoryInputs(START))

@@ -1,6 +1,7 @@
 """The table of topics against the objects and the messages that it speaks of."""
 
 from collections import Counter
+from types import SimpleNamespace
 
 import pytest
 
@@ -73,3 +74,13 @@ def test_a_field_that_is_not_there_is_named() -> None:
     message = conversions.message(by_name("valve_command"), 0, {"valve_command": 0.5})
     with pytest.raises(LookupError, match=r"no velocity\[3\]"):
         conversions.field_value(message, "velocity[3]")
+
+
+def test_velocity_command_without_forces_is_one_whose_forces_are_not_known() -> None:
+    command = {topic.name: topic for topic in ROBOT_TOPICS}["velocity_command"]
+    given = SimpleNamespace(velocity=[0.01] * 6, effort=[])
+    told = conversions.values(command, given)
+    assert told["joint2_velocity_command"] == 0.01
+    assert all(told[f"{joint}_expected_force"] == 0.0 for joint in JOINTS)
+    with pytest.raises(LookupError, match=r"no velocity\[0\]"):
+        conversions.values(command, SimpleNamespace(velocity=[], effort=[]))

@@ -1,0 +1,108 @@
+"""Many machines at a time: without effects in the lanes of the processor's vector registers.
+
+The right-hand side of `core.py` then runs in a loop over LANES machines, which the compiler
+turns into vector instructions; every number comes out as it does for a machine by itself. With
+effects no such loop can be had: each has branches and functions of its own. Those machines run
+one by one.
+"""
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from emir_plant import core
+from emir_plant.core import DELAY_LINE, MODES, P_S, STEP, Array, Truth
+from emir_plant.jit import compiled, compiled_parallel
+from emir_plant.lane import lane
+from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
+
+LANES = 8  # doubles in the widest registers there are
+COLUMNS = len(Truth._fields)
+STAGES = ("k1", "k2", "k3", "k4", "between")
+
+
+def simulate_many(
+    starts: Array, commands: Array, dt: float, every: int, parameters: NDArray[Any]
+) -> Array:
+    """Run m machines under the same commands, on all cores.
+
+    starts: (m, n) states; commands: (k,), each held for dt, s; parameters: (m,) records.
+    Returns (m, 1 + k // every, len(Truth)) as `core.simulate` gives it for each, bit by bit.
+    """
+    if len(starts) < LANES or any(parameters[name].any() for name in EFFECT_SIZES):
+        return core.simulate_each(starts, commands, dt, every, parameters)
+    found = _simulate(_side_by_side(starts, parameters), commands, dt, every)
+    return found[: len(starts)]
+
+
+def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
+    """Return records of LANES machines each, effects left out; the last one fills up the rest."""
+    groups, size = -(-len(starts) // LANES), starts.shape[1] * LANES
+    kept = [name for name in parameters.dtype.names or () if name not in EFFECT_FIELDS]
+    layout = [(name, np.float64, (*parameters.dtype[name].shape, LANES)) for name in kept]
+    layout += [(name, np.float64, (size,)) for name in ("state", *STAGES)]
+    machines = np.zeros(groups, layout)
+    members = np.minimum(np.arange(groups * LANES), len(starts) - 1).reshape(groups, LANES)
+    machines["state"] = np.moveaxis(starts[members], 1, -1).reshape(groups, size)
+    for name in kept:
+        machines[name] = np.moveaxis(parameters[name][members], 1, -1)
+    return machines
+
+
+@compiled
+def _write_rates(machines: Any, x: Array, command: float, dx: Array) -> None:
+    for i in range(LANES):
+        p = lane(machines, i)
+        core.write_derivative_of(x[i::LANES], command, p, dx[i::LANES])
+
+
+@compiled
+def _write_sum(x: Array, h: float, rates: Array, result: Array) -> None:
+    """Write x + h rates to result, but for the delay line, which is empty."""
+    for i in range(DELAY_LINE * LANES):
+        result[i] = x[i] + h * rates[i]
+    for k in range(x.size - MODES * LANES):
+        i = MODES * LANES + k  # counted from 0, or the compiler does not see neighbours
+        result[i] = x[i] + h * rates[i]
+
+
+@compiled
+def _step(m: Any, command: float, h: float) -> None:
+    """Advance the machines m by one step of Runge-Kutta 4, as `core` does without friction."""
+    x, k1, k2, k3, k4, between = m.state, m.k1, m.k2, m.k3, m.k4, m.between
+    _write_rates(m, x, command, k1)
+    _write_sum(x, 0.5 * h, k1, between)
+    _write_rates(m, between, command, k2)
+    _write_sum(x, 0.5 * h, k2, between)
+    _write_rates(m, between, command, k3)
+    _write_sum(x, h, k3, between)
+    _write_rates(m, between, command, k4)
+    for i in range(DELAY_LINE * LANES):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    for k in range(x.size - MODES * LANES):
+        i = MODES * LANES + k
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    for i in range((P_S + 1) * LANES):
+        x[i] = max(x[i], 0.0)  # p_H and p_S
+
+
+@compiled_parallel
+def _simulate(machines: NDArray[Any], commands: Array, dt: float, every: int) -> Array:
+    """Return (groups * LANES, 1 + k // every, COLUMNS)."""
+    steps = max(1, math.ceil(dt / STEP - 1e-9))
+    result = np.empty((machines.size * LANES, 1 + commands.size // every, COLUMNS))
+    for group in numba.prange(machines.size):
+        m = machines[group]
+        for k in range(commands.size + 1):
+            if k % every == 0:
+                for i in range(LANES):
+                    p = lane(m, i)
+                    for column, value in enumerate(core.truth_of(m.state[i::LANES], p)):
+                        result[group * LANES + i, k // every, column] = value
+            if k < commands.size:
+                for _ in range(steps):
+                    _step(m, commands[k], dt / steps)
+    return result

@@ -234,7 +234,9 @@ def _compare(words: list[str]) -> int:
     parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
-    parser.add_argument("--trade-off", action="store_true", help="instead: cascade over k_p and T")
+    parser.add_argument(
+        "--trade-off", action="store_true", help="instead: cascade over k_p and T, others"
+    )
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.disturbance import LoadChange, reloaded
-from emir_analysis.node_controls import CascadeControl, Stepping, force_loop_signals, situation
-from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters, ForceLoopState
+from emir_analysis.node_controls import CascadeControl, ForceLoopControl, Stepping, situation
+from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
@@ -21,7 +21,7 @@ from emir_msgs_py.topics import (
     TRUTH,
 )
 from emir_plant.plant import Plant
-from emir_plant.sensors import Measurement, measure
+from emir_plant.sensors import measure
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class ClosedLoop:
         Returns every signal of the topic table by name: those of the plant with one value each
         plant period, those of the controllers with one each control period, both ends included.
         """
-        plant = self.plant
+        plant, damped = self.plant, ForceLoopControl(self.force_loop)
         state = plant.initial(angle, pressure_lowering)
         truth = plant.outputs(state)
         changing = round(self.change.time / PLANT_PERIOD) if self.change else -1
@@ -77,25 +77,13 @@ class ClosedLoop:
 
                 signals = {name: now[name] for name in REFERENCE_SIGNALS}
                 if "velocity_command" in wanted:
-                    damping, valve = self._force_loop(damping, wanted["velocity_command"], reading)
+                    damping, valve = damped.step(damping, now | wanted, PERIOD)
                     signals |= valve
                 signals |= wanted
                 _append(rows, signals)
             if tick < last:
                 state, truth = plant.step(state, signals["valve_command"], PLANT_PERIOD)
         return {name: np.array(values) for name, values in rows.items()}
-
-    def _force_loop(
-        self, state: ForceLoopState | None, command: float, reading: Measurement
-    ) -> tuple[ForceLoopState, dict[str, float]]:
-        """Return the force loop's next state and signals under a velocity command, m/s."""
-        inputs = ForceLoopInputs(
-            command, 0.0, reading.angle, reading.pressure_lifting, reading.pressure_lowering
-        )
-        state, outputs = self.force_loop.step(
-            state or self.force_loop.initial(inputs), inputs, PERIOD
-        )
-        return state, force_loop_signals(outputs)
 
 
 def _append(rows: dict[str, list[float]], signals: dict[str, float]) -> None:

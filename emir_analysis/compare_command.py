@@ -29,7 +29,9 @@ def command(options: Namespace, progress: Progress) -> str:
             save(damping.picture(joint1()), options.picture)
         return damping.as_text(joint1())
     if options.trade_off:
-        curve = trade_off.curve(joint1(), progress)
+        others = select(_known(options), options.controllers)
+        others.pop("cascade", None)
+        curve = trade_off.curve(joint1(), others, progress)
         if options.picture:
             save(trade_off.picture(curve), options.picture)
         return trade_off.as_text(curve)

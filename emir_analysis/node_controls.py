@@ -13,7 +13,12 @@ from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
 from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
-from emir_control.prefilter import PrefilterParameters, joint_angle, piston_stroke
+from emir_control.prefilter import (
+    PrefilterParameters,
+    commanded_velocity,
+    joint_angle,
+    piston_stroke,
+)
 from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.shaping import ShapedCascade, ShapedInputs
 from emir_control.tip import Tip, TipInputs
@@ -43,6 +48,7 @@ from emir_msgs_py.topics import (
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
     VALVE_COMMAND,
+    VALVE_LOOPS,
     VELOCITY_COMMAND,
     Topic,
 )
@@ -97,6 +103,14 @@ def situation(
     wanted = {"reference_stroke": reference.stroke, "reference_velocity": reference.velocity}
     ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
     return reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
+
+
+@runtime_checkable
+class TakesOverAtRest(NodeControl, Protocol):
+    """A controller that plans whole moves: it takes over between two of them."""
+
+    def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
+        """Return the next state while another drives, and what is offered. state None: begin."""
 
 
 class _Piston:
@@ -294,7 +308,24 @@ class LqgControl:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
-        inputs = LqgInputs(
+        inputs = self._inputs(signals)
+        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
+        return state, _lqg_signals(self.name, outputs) | self._offered(outputs.valve_command)
+
+    def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
+        """Return the next state while another drives, and what is offered. state None: begin."""
+        inputs = self._inputs(signals)
+        state, ready = self.lqg.stand_by(state or self.lqg.initial(inputs), inputs)
+        shut = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
+        return state, _lqg_signals(self.name, shut) | self._offered(0.0, ready=ready)
+
+    def _offered(self, command: float, *, ready: bool = True) -> Signals:
+        """Return the command as the velocity that the prefilter turns into it."""
+        velocity = commanded_velocity(command, self.lqg.parameters.actuator.static)
+        return {f"{self.name}_command": velocity, f"{self.name}_ready": float(ready)}
+
+    def _inputs(self, signals: Signals) -> LqgInputs:
+        return LqgInputs(
             signals["reference_stroke"],
             _move(signals),
             signals["angle"],
@@ -302,8 +333,6 @@ class LqgControl:
             signals["pressure_lowering"],
             signals["deflection"],
         )
-        state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, _lqg_signals(self.name, outputs)
 
 
 @dataclass(frozen=True)
@@ -332,6 +361,7 @@ class ForceLoopControl:
             signals["angle"],
             signals["pressure_lifting"],
             signals["pressure_lowering"],
+            direct=any(signals.get(f"{name}_active") == 1.0 for name in VALVE_LOOPS),
         )
         state, outputs = self.force_loop.step(state or self.force_loop.initial(inputs), inputs, dt)
         return state, force_loop_signals(outputs)
@@ -363,7 +393,8 @@ def _move(signals: Signals) -> Move:
 def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
     terms = outputs._asdict()
     command = terms.pop("valve_command")
-    return {"valve_command": command} | {f"{prefix}_{name}": v for name, v in terms.items()}
+    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
+    return {"valve_command": command} | named
 
 
 def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:

@@ -48,6 +48,7 @@ from emir_msgs_py.topics import (
     OFFERED_COMMANDS,
     OUTER_LOOPS,
     SELECTOR_TERMS,
+    VALVE_COMMAND,
     VELOCITY_COMMAND,
 )
 from emir_plant.sheet import joint1
@@ -91,7 +92,11 @@ def _replay_joint1(
     if offered and standby:  # one of several: it heard what was applied
         for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
             inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
-        answers = tuple(offered if topic is VELOCITY_COMMAND else topic for topic in answers)
+        commands = VELOCITY_COMMAND, VALVE_COMMAND
+        answers = tuple(offered if topic in commands else topic for topic in answers)
+    elif node == "force_loop" and full_name(SELECTOR_TERMS, there):
+        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
+            inputs.get(stamp, {}).update(applied)
     kept = tuple(topic for topic in answers if full_name(topic, there))
     outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
     obedient = Obedience(law_of_node, values, changed, orders(bag, f"{node}_node"))

@@ -10,7 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from emir_analysis.node_controls import NodeControl, Signals, Switchable, Topics
+from emir_analysis.node_controls import (
+    NodeControl,
+    Signals,
+    Switchable,
+    TakesOverAtRest,
+    Topics,
+)
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (
     OFFERED_COMMANDS,
@@ -40,6 +46,8 @@ class Ready:
 
         A controller that is not `Switchable` begins anew when it is chosen.
         """
+        if isinstance(self.control, TakesOverAtRest):
+            return self._step_at_rest(self.control, state, signals, dt)
         before = start = self._caught_up(state, signals, dt)
         stands_by = before is not None and not self._drives(signals)
         if stands_by and isinstance(self.control, Switchable):
@@ -48,6 +56,17 @@ class Ready:
         offered = {f"{self.name}_command": outputs["velocity_command"]}
         terms = {name: value for name, value in outputs.items() if name != "velocity_command"}
         return ReadyState(before, own, signals), terms | offered
+
+    def _step_at_rest(
+        self, control: TakesOverAtRest, state: ReadyState | None, signals: Signals, dt: float
+    ) -> tuple[ReadyState, Signals]:
+        own = state.own if state else None
+        if self._drives(signals):
+            own, outputs = control.step(own, signals, dt)
+        else:
+            own, outputs = control.stand_by(own, signals)
+        terms = {name: value for name, value in outputs.items() if name != "valve_command"}
+        return ReadyState(None, own, signals), terms
 
     def _caught_up(self, state: ReadyState | None, signals: Signals, dt: float) -> Any:
         """Return the controller's state after the period that has passed."""
@@ -96,10 +115,11 @@ class Selector:
         if times != sorted(set(times)) or times[:1] != [0.0]:
             raise ParameterError(f"times of switching {times}: have to rise from 0 s")
 
-    def step(self, state: int | None, signals: Signals, dt: float) -> tuple[int, Signals]:
-        """Return the number of periods and the command of the controller whose time it is."""
-        ticks = state or 0
-        return ticks + 1, self.selected(self.due(ticks, dt), signals)
+    @staticmethod
+    def driver(driving: str, wanted: str, signals: Signals) -> str:
+        """Return who drives: the one that is wanted, as soon as it is ready."""
+        ready = signals.get(f"{wanted}_ready", 1.0) == 1.0
+        return wanted if ready and f"{wanted}_command" in signals else driving
 
     def due(self, ticks: int, dt: float) -> str:
         """Return who drives after a number of periods of dt, s, by the switches alone."""
@@ -114,10 +134,11 @@ class Selector:
 
 
 class Chosen(NamedTuple):
-    """How many periods have passed, and whose command is handed on."""
+    """How many periods have passed, who is to drive, and whose command is handed on."""
 
     ticks: int
     name: str
+    drives: str
 
 
 @dataclass(frozen=True)
@@ -135,15 +156,16 @@ class Choosing:
 
     def step(self, state: Chosen | None, signals: Signals, dt: float) -> tuple[Chosen, Signals]:
         """Return the next state and the chosen controller's command; state None: begin here."""
-        ticks, name = state or Chosen(0, self.first)
+        ticks, name, drives = state or Chosen(0, self.first, self.first)
         due = self.selector.due(ticks, dt)
         if ticks and due != self.selector.due(ticks - 1, dt):
             name = due
-        return Chosen(ticks + 1, name), self.selector.selected(name, signals)
+        drives = self.selector.driver(drives, name, signals)
+        return Chosen(ticks + 1, name, drives), self.selector.selected(drives, signals)
 
     def choose(self, state: Chosen | None, name: str) -> Chosen:
-        """Return the state in which that controller drives from the next period on."""
-        return Chosen(state.ticks if state else 0, name)
+        """Return the state in which that controller drives as soon as it is ready."""
+        return state._replace(name=name) if state else Chosen(0, name, name)
 
 
 @dataclass(frozen=True)
@@ -155,14 +177,14 @@ class SwitchedLoop:
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the signals; state None: begin here."""
-        selector = Selector(tuple(self.controls), self.switches)
-        begin: tuple[dict[str, Any], int | None, Signals] = ({}, None, {})
-        states, ticks, fed_back = state or begin
+        selector = Choosing(Selector(tuple(self.controls), self.switches), self.switches[0].name)
+        begin: tuple[dict[str, Any], Chosen | None, Signals] = ({}, None, {})
+        states, driving, fed_back = state or begin
         known = signals | fed_back
         after: dict[str, ReadyState] = {}
         offered: Signals = {}
         for name, control in self.controls.items():
             after[name], terms = Ready(name, control).step(states.get(name), known, dt)
             offered |= terms
-        ticks, selected = selector.step(ticks, offered, dt)
-        return (after, ticks, selected), offered | selected
+        driving, selected = selector.step(driving, offered, dt)
+        return (after, driving, selected), offered | selected

@@ -156,6 +156,25 @@ class Actuator:
             out = _turbulent(oil.lifting - p.tank, resistance)
         return -out, self._pumped(o * p.static.flow_lowering, oil.lowering)
 
+    def ahead(self, oil: Oil, opening: float, velocity: float, dt: float) -> Oil:
+        """Return the oil dt, s, later, with an opening and a piston velocity, m/s (midpoint)."""
+        middle = self._changed(oil, oil, opening, velocity, 0.5 * dt)
+        return self._changed(oil, middle, opening, velocity, dt)
+
+    def _changed(self, oil: Oil, at: Oil, opening: float, velocity: float, dt: float) -> Oil:
+        """Return the oil after dt, s, at the rates of another instant's."""
+        s, beta = self.parameters.static, self.softness * self.parameters.beta
+        lifting, lowering = self._shares(at.stroke)
+        into_lifting, into_lowering = self.flows(opening, at)
+        up = beta * lifting * (into_lifting / s.area_lifting - velocity)
+        down = beta * lowering * (into_lowering / s.area_lowering + velocity)
+        return Oil(
+            oil.stroke + velocity * dt,
+            max(oil.lifting + up * dt, 0.0),
+            max(oil.lowering + down * dt, 0.0),
+            self.next_logic(oil.logic, at.lifting, dt),
+        )
+
     def supply_needed(self, force: float, velocity: float) -> float:
         """Return the pump's pressure, Pa, that a steady motion takes with the valve fully open.
 

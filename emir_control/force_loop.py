@@ -1,7 +1,7 @@
 """Force feedback: damps the machine without the oil loss of a leakage line (paper 3.1)."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from emir_common.quantity import check_ranges, quantity
@@ -51,6 +51,7 @@ class ForceLoopInputs(NamedTuple):
     pressure_lifting: float  # Pa
     pressure_lowering: float  # Pa
     stroke: float | None = None  # m, of a linkage that is no triangle; None: from the angle
+    direct: bool = False  # the velocity stands for a valve command that is to be handed on
 
 
 class ForceLoopOutputs(NamedTuple):
@@ -79,7 +80,8 @@ class ForceLoop:
     ) -> tuple[ForceLoopState, ForceLoopOutputs]:
         """Return the valve command of this control period of dt, s.
 
-        An input that is not a number shuts the valve and leaves the force's state as it was.
+        An input that is not a number shuts the valve and leaves the force's state as it was. What
+        is handed on is neither damped nor limited: who commands the valve does that himself.
         """
         if not all(math.isfinite(value) for value in inputs if value is not None):
             return state._replace(wanted=0.0), ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
@@ -87,6 +89,12 @@ class ForceLoop:
         if not math.isfinite(state.static_force):  # begun without a measurement
             state = self.initial(inputs, state.wanted)
         force = self._force(inputs)
+        if inputs.direct:
+            velocity = inputs.velocity_command
+            command = valve_command(velocity, replace(p.prefilter, standstill=0.0))
+            saturated = abs(command) >= 1.0
+            outputs = ForceLoopOutputs(command, force, 0.0, velocity, saturated)
+            return ForceLoopState(force, velocity), outputs
         static_force = low_pass(state.static_force, force, p.time_constant, dt)
         feedback = p.gain * (force - static_force)
         wanted = inputs.velocity_command

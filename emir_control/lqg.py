@@ -6,7 +6,8 @@ At a move's start the payload is read from the piston force at rest, the move is
     u = u_plan - d - L (x - x_target),    x_target = 0 but for s = f,
 
 with the state x, the unknown force f, flow d and load p estimated by a Kalman filter. The
-drive's inverse (`actuator.py`) turns u into the valve command by the pressures as measured.
+drive's inverse (`actuator.py`) turns u into the valve command by the pressures as they will be
+when it acts: those measured, led on by the commands under way and the plan.
 """
 
 import math
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
-from emir_control.motion_plan import MotionPlan, Target, planned, resting
+from emir_control.limits import LimitParameters, off_the_ends
+from emir_control.motion_plan import MotionPlan, Planner, Target, resting
 from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
 from emir_control.regulator import Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
@@ -28,7 +30,10 @@ from emir_control.trajectory import NO_MOVE, Move
 Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
+STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
+SURPRISE_SHARE = 0.2  # of a period in the mean surprise
+SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,11 +74,12 @@ class LqgParameters:
     period: float = 0.032
     actuator: ActuatorParameters = field(default_factory=ActuatorParameters)
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
+    limits: LimitParameters = field(default_factory=LimitParameters)
     softness: float = quantity(
         "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
     )
     allowance: float = quantity(
-        "1", 0.0, 1.0, "of the plan's deflection over the smallest, for smoothness", default=0.055
+        "1", 0.0, 1.0, "of the plan's deflection over the smallest, for less travel", default=0.03
     )
     friction: float = quantity("N", 0.0, 1e5, "expected at the move's start", default=3e3)
     hysteresis: float = quantity("1", 0.0, 0.1, "width of the spool's play", default=0.01)
@@ -86,7 +92,13 @@ class LqgParameters:
     lead: float = quantity("s", 0.1, 10.0, "before the move, when it is planned", default=0.6)
     fill: FillParameters = field(default_factory=FillParameters)
     reading_time: float = quantity(
-        "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=2.0
+        "s", 0.032, 10.0, "over which force and bending at rest are averaged", default=1.0
+    )
+    settling: float = quantity(
+        "s", 0.0, 10.0, "from a move's end to the rest after it", default=1.0
+    )
+    other_load: float = quantity(
+        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=1.2e4
     )
 
     def __post_init__(self) -> None:
@@ -116,7 +128,10 @@ class LqgState(NamedTuple):
     """Where the control stands.
 
     offset: of the measured bending, rad, in
-    gravity of cos(alpha) = 1. estimate: (n,) x. past: u off the plan, m/s, the newest first.
+    gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
+    of the valve of commands that are under way, the newest first. cut: the move was to end too
+    near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
+    seems to come or to go. reference: m, of the last period of standing by.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -128,10 +143,15 @@ class LqgState(NamedTuple):
     rest: Rest
     estimate: Array
     past: tuple[float, ...]
+    openings: tuple[float, ...]
     logic: float
     command: float
     moving: bool
     filled: Filled
+    cut: bool = False
+    surprise: float = 1.0
+    loaded: bool = False
+    reference: float = math.nan
 
 
 class LqgInputs(NamedTuple):
@@ -155,6 +175,7 @@ class LqgOutputs(NamedTuple):
     force: float  # f, N
     payload: float  # kg
     deflection: float  # dynamic, of the TCP, as estimated, m
+    limited: bool = False  # off an end of the stroke: the command, or the move as planned
 
 
 class Now(NamedTuple):
@@ -201,14 +222,22 @@ class Lqg:
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
-        arrived = time >= plan.duration
-        estimate = self._corrected(state, inputs, target, arrived=arrived)
+        arrived = time >= plan.ends
+        estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
+        loaded = surprise > (1.0 if state.loaded else SURPRISE)
+        state = state._replace(surprise=surprise, loaded=loaded)
         from_plan = plan.velocity(time + self._late, dt)
-        logic = max(state.logic, LEAST_OPEN)
-        oil = Oil(target.stroke, inputs.pressure_lifting, inputs.pressure_lowering, logic)
+        measured = inputs.pressure_lifting, inputs.pressure_lowering, state.logic
+        oil = _open(self._acting(state, Oil(target.stroke, *measured), time, dt))
         wanted = from_plan + self._feedback(state, estimate, Now(time + self._late, dt, oil))
+        allowed = self._allowed(wanted, inputs.angle)
+        limited, wanted = state.cut or allowed != wanted, allowed
         shut = self._resting(law, estimate, wanted, arrived=arrived)
         opening = 0.0 if shut else self.drive.opening(wanted, oil)
+        if opening:  # the pressures change while it acts
+            velocity = plan.piston(time + self._late, 0.5 * dt)
+            oil = _open(self.drive.ahead(oil, opening, velocity, 0.5 * dt))
+            opening = self.drive.opening(wanted, oil)
         given = self.drive.velocity(opening, oil) - from_plan
         after = self._moved(state, estimate, given, opening, inputs)
         outputs = LqgOutputs(
@@ -219,8 +248,26 @@ class Lqg:
             float(estimate[law.force]) * plan.stiffness,
             state.payload,
             float(law.deflection @ self._off(state, estimate)[: law.modes]),
+            limited,
         )
         return after, outputs
+
+    def stand_by(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, bool]:
+        """Return the next state while another one drives, and whether this one may take over.
+
+        It may where the reference has rested for long enough to read the payload, swinging boom or
+        not.
+        """
+        if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
+            return state._replace(reference=math.nan), False
+        moves = inputs.reference != state.reference or self._under_way(inputs.move)
+        enough = STANDING_BY * self._enough
+        rest = self._read(state.rest, inputs, 1 if moves else state.rest.periods + 1, enough)
+        logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
+        state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
+        if rest.periods == enough:
+            state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
+        return state._replace(reference=inputs.reference), rest.periods >= enough
 
     @property
     def _begins(self) -> float:
@@ -231,6 +278,17 @@ class Lqg:
     def _late(self) -> float:
         """From measurement to spool, s."""
         return self.parameters.regulator.delay + self.drive.lag
+
+    def _acting(self, state: LqgState, oil: Oil, time: float, dt: float) -> Oil:
+        """Return the oil when the command of this period begins to act."""
+        whole, part = divmod(self._late, dt)
+        spans = [part, *[dt] * int(whole)]
+        for span, opening in zip(spans, reversed(state.openings), strict=True):
+            for half in (time, time + 0.5 * span):
+                velocity = state.plan.piston(half, 0.5 * span)
+                oil = self.drive.ahead(oil, opening, velocity, 0.5 * span)
+            time += span
+        return oil
 
     def _waiting(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, LqgOutputs]:
         """Return the shut valve of a move that is planned and has not begun."""
@@ -272,22 +330,47 @@ class Lqg:
 
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
-        if inputs.move.distance and inputs.move.since >= -self.parameters.lead:
+        p = self.parameters
+        if self._under_way(inputs.move):
             if state.moving:
                 return state
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
-        count = 1 if state.moving else state.rest.periods + 1
-        weight = 1.0 / min(count, round(self.parameters.reading_time / self.parameters.period))
         last = state.rest
-        rest = last._replace(periods=count, angle=last.angle + weight * (inputs.angle - last.angle))
-        if not state.filled.moved or state.moving:  # what was read before still holds
-            force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
-            rest = rest._replace(
-                force=last.force + weight * (force - last.force),
-                bending=last.bending + weight * (inputs.deflection - last.bending),
-            )
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        other = abs(force - last.force) > p.other_load
+        count = 1 if state.moving or other else last.periods + 1
+        rest = self._read(last, inputs, count, self._enough)
+        if state.filled.moved and not state.moving:  # what was read before still holds
+            rest = rest._replace(force=last.force, bending=last.bending)
         filled = NOT_FILLED if state.moving else state.filled
+        off = rest.force - state.plan.at(math.inf).force
+        if count == self._enough and abs(off) > p.other_load and not filled.moved:
+            resting_on = inputs._replace(move=NO_MOVE)
+            return self._begin(rest, resting_on, state.logic, state.command, filled)
         return state._replace(rest=rest, moving=False, filled=filled)
+
+    @property
+    def _enough(self) -> int:
+        """Control periods over which is read at rest."""
+        return round(self.parameters.reading_time / self.parameters.period)
+
+    def _read(self, last: Rest, inputs: LqgInputs, count: int, most: int) -> Rest:
+        """Return the means at rest with a further reading, the count-th, of the most that count."""
+        force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
+        now = Rest(count, force, inputs.deflection, inputs.angle)
+        weight = 1.0 / min(count, most)
+        return Rest(count, *(a + weight * (b - a) for a, b in zip(last[1:], now[1:], strict=True)))
+
+    def _under_way(self, move: Move) -> bool:
+        """Tell whether a move is to be planned or made, or has just ended."""
+        p = self.parameters
+        return bool(move.distance) and -p.lead <= move.since < move.duration + p.settling
+
+    def _payload(self, force: float, angle: float) -> float:
+        """Return the payload, kg, that a force at rest, N, holds at an angle of the joint, rad."""
+        linkage = self.parameters.actuator.static
+        torque = force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
+        return self.parameters.boom.payload(torque)
 
     def _begin(
         self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
@@ -295,13 +378,14 @@ class Lqg:
         """Return the state at the start of a move, or of a rest, with what was read at rest."""
         p, drive, move = self.parameters, self.drive, inputs.move
         linkage = p.actuator.static
-        start = inputs.reference
+        ends = inputs.reference, inputs.reference + move.distance
+        start, end = here, _ = self._off_the_ends(rest, ends)
+        cut = (start, end) != ends
         if move.distance and filled.moved:
             start = piston_stroke(rest.angle, linkage)
-            move = move._replace(distance=move.distance + inputs.reference - start)
-        angle = joint_angle(inputs.reference, linkage)
-        torque = rest.force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
-        payload = p.boom.payload(torque)
+        move = move._replace(distance=end - start)
+        angle = joint_angle(here, linkage)
+        payload = self._payload(rest.force, angle)
         boom = p.boom.loaded(payload)
         plan = self._plan(boom, start, move)
         law = regulator(boom, drive, start + 0.5 * move.distance, p.period, p.regulator)
@@ -311,19 +395,37 @@ class Lqg:
         hanging = float(plan.bending[0]) / math.cos(float(plan.angle[0]))
         offset = rest.bending / math.cos(angle) - hanging
         past = (0.0,) * law.delays
-        memory = past, logic, command, move.distance != 0.0, filled
+        memory = past, past, logic, command, inputs.move.distance != 0.0, filled, cut
         return LqgState(plan, law, payload, offset, rest, estimate, *memory)
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
             return resting(boom, self.drive, start)
-        allowance = self.parameters.allowance
-        return planned(boom, self.drive, start, move, allowance)
+        p = self.parameters
+        return Planner(self.drive, p.period, self._late, p.allowance).plan(boom, start, move)
+
+    def _off_the_ends(self, rest: Rest, ends: tuple[float, float]) -> tuple[float, float]:
+        """Return start and end of a move, m, kept off the ends of the stroke.
+
+        Who stands beyond the margin may stay there.
+        """
+        p = self.parameters.limits
+        here = piston_stroke(rest.angle, self.parameters.actuator.static)
+        low = min(p.stroke_low + p.end_margin, here)
+        high = max(p.stroke_high - p.end_margin, here)
+        start, end = (min(max(place, low), high) for place in ends)
+        return start, end
+
+    def _allowed(self, wanted: float, angle: float) -> float:
+        """Return what of a velocity u, m/s, keeps within the limits at a measured angle, rad."""
+        p = self.parameters.limits
+        stroke = piston_stroke(angle, self.parameters.actuator.static)
+        return off_the_ends(min(max(wanted, -p.speed), p.speed), stroke, 0.0, p)
 
     def _corrected(
         self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
-    ) -> Array:
-        """Return x corrected by what is measured."""
+    ) -> tuple[Array, float]:
+        """Return x corrected by what is measured, and the mean surprise."""
         law = state.regulator
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         bending = target.bending + state.offset * math.cos(target.angle)
@@ -332,8 +434,12 @@ class Lqg:
             inputs.deflection - bending,
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
-        gain = law.kalman_at_rest if arrived else law.kalman
-        return state.estimate + gain @ (measured - law.C @ state.estimate)
+        innovation = measured - law.C @ state.estimate
+        known = law.at_rest if arrived else law.moving
+        squared = float(innovation @ known.certainty @ innovation) / len(innovation)
+        surprise = state.surprise + SURPRISE_SHARE * (squared - state.surprise)
+        gain = known.loaded if state.loaded else known.gain
+        return state.estimate + gain @ innovation, surprise
 
     def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""
@@ -372,4 +478,15 @@ class Lqg:
         if command not in {state.command, 0.0}:  # the spool's play, taken up ahead
             command += math.copysign(0.5 * self.parameters.hysteresis, command - state.command)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, period)
-        return state._replace(estimate=ahead, past=given_all[:-1], logic=logic, command=command)
+        return state._replace(
+            estimate=ahead,
+            past=given_all[:-1],
+            openings=(opening, *state.openings)[:-1],
+            logic=logic,
+            command=command,
+        )
+
+
+def _open(oil: Oil) -> Oil:
+    """Return the oil with a logic block that is not shut, as the drive's inverse wants it."""
+    return oil._replace(logic=max(oil.logic, LEAST_OPEN))

@@ -1,23 +1,25 @@
 """A planned move: where joint, boom and piston force should be at every instant, and how.
 
-From the joint's motion of least bending follows all else: the boom's bending by its equations,
-the piston force by the rigid mode's, the drive's velocity u = v + dF/dt / k_h by the drive's.
+From the velocities of least bending (`drive_plan.py`) follow joint and bending; stroke and force
+then by linkage and weight of each posture, and the drive's velocity u = v + dF/dt / k_h of them.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from emir_control.actuator import Actuator
-from emir_control.boom import Boom, ClampedBoom
-from emir_control.least_bending import STEP, Motion, Task, plan
+from emir_control.boom import Boom
+from emir_control.drive_plan import PARTS, Drive, HeldTask, gentlest
 from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
 from emir_control.trajectory import Move
 
 Array = NDArray[np.float64]
+
+SHORTEST = 10  # control periods
 
 
 class Target(NamedTuple):
@@ -31,13 +33,15 @@ class Target(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MotionPlan:
-    """Samples in steps of STEP from the move's start; before and after it everything rests.
+    """Samples from a time after the move's start; before and after them everything rests.
 
-    stiffness: k_h in the move's middle, N/m. angle, stroke, bending, force: (n,), as in Target.
-    deflection: (n,) dynamic, of the TCP, m.
+    stiffness: k_h in the move's middle, N/m. begins, step: s, first sample and between two. angle,
+    stroke, bending, force: (n,), as in Target. deflection: (n,) dynamic, of the TCP, m.
     """
 
     stiffness: float
+    begins: float
+    step: float
     angle: Array
     stroke: Array
     bending: Array
@@ -45,13 +49,13 @@ class MotionPlan:
     deflection: Array
 
     @property
-    def duration(self) -> float:
-        """Return how long it takes, s."""
-        return STEP * (len(self.angle) - 1)
+    def ends(self) -> float:
+        """Return when it is over, s after the move's start."""
+        return self.begins + self.step * (len(self.angle) - 1)
 
     def at(self, time: float) -> Target:
         """Return where everything should be, time s after the start."""
-        place = min(max(time / STEP, 0.0), len(self.angle) - 1.0)
+        place = min(max((time - self.begins) / self.step, 0.0), len(self.angle) - 1.0)
         k = min(int(place), len(self.angle) - 2)
         share = place - k
 
@@ -63,7 +67,7 @@ class MotionPlan:
 
     def bend(self, time: float) -> float:
         """Return the TCP's dynamic deflection, m, time s after the start; 0 once it is over."""
-        steps = STEP * np.arange(len(self.deflection))
+        steps = self.begins + self.step * np.arange(len(self.deflection))
         return float(np.interp(time, steps, self.deflection, right=0.0))
 
     def velocity(self, time: float, dt: float) -> float:
@@ -72,61 +76,78 @@ class MotionPlan:
         pushed = (then.force - now.force) / self.stiffness
         return (then.stroke - now.stroke + pushed) / dt
 
+    def piston(self, time: float, dt: float) -> float:
+        """Return the mean velocity of the piston, m/s, over dt, s, from a time, s, on."""
+        return (self.at(time + dt).stroke - self.at(time).stroke) / dt
 
-def planned(boom: Boom, drive: Actuator, start: float, move: Move, allowance: float) -> MotionPlan:
-    """Return the plan of a move from a stroke, m, its deflection within an allowance, 1.
 
-    Raises NoMotionError where the valve's flow does not allow it.
+@dataclass(frozen=True)
+class Planner:
+    """Plans moves for commands that act once a period, s, `late`, s, after the measurement.
+
+    allowance: of a plan's deflection over the smallest, 1.
     """
-    linkage = drive.parameters.static
-    ends = joint_angle(start, linkage), joint_angle(start + move.distance, linkage)
-    turn = ends[1] - ends[0]
-    arm = move.distance / turn
-    low, high = -linkage.flow_lowering / linkage.area_lowering, linkage.flow_lifting
-    task = Task(turn, move.duration, low / arm, high / linkage.area_lifting / arm)
-    clamped = boom.clamped()
-    return _follow(boom, drive, ends[0], plan(clamped, task, allowance), clamped)
+
+    drive: Actuator
+    period: float
+    late: float
+    allowance: float
+
+    def plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
+        """Return the plan of a move from a stroke, m.
+
+        Raises NoMotionError where the valve's flow does not allow it.
+        """
+        drive = self.drive
+        linkage = drive.parameters.static
+        ends = joint_angle(start, linkage), joint_angle(start + move.distance, linkage)
+        turn = ends[1] - ends[0]
+        middle = Drive(
+            arm=move.distance / turn,
+            stiffness=drive.stiffness(start + 0.5 * move.distance),
+            slope=(_holding(boom, drive, ends[1]) - _holding(boom, drive, ends[0])) / turn,
+            low=-linkage.flow_lowering / linkage.area_lowering,
+            high=linkage.flow_lifting / linkage.area_lifting,
+        )
+        count = max(round(move.duration / self.period), SHORTEST)
+        task = HeldTask(turn, self.period, count)
+        motion = gentlest(boom, middle, task, self.allowance)
+        angle = ends[0] + motion.angle
+        shape = np.outer(np.cos(angle), boom.sag()) + motion.bent @ boom.clamped().shapes.T
+        arms = np.array([piston_velocity(1.0, each, linkage) for each in angle])
+        pushed = middle.stiffness * middle.arm / arms * motion.pushed
+        return MotionPlan(
+            stiffness=middle.stiffness,
+            begins=self._first(move.since),
+            step=self.period / PARTS,
+            angle=angle,
+            stroke=np.array([piston_stroke(each, linkage) for each in angle]),
+            bending=shape @ (boom.tip_angle - boom.joint),
+            force=pushed + np.array([_holding(boom, drive, each) for each in angle]),
+            deflection=motion.deflection,
+        )
+
+    def _first(self, since: float) -> float:
+        """Return the time nearest to a move's start, s, at which a command acts.
+
+        since: s, of a control period.
+        """
+        half = 0.5 * self.period
+        return (since + self.late + half) % self.period - half
 
 
 def resting(boom: Boom, drive: Actuator, stroke: float) -> MotionPlan:
     """Return the plan to stay at a stroke, m."""
-    still = Motion(np.zeros(1), np.zeros(2), np.zeros(2))
     angle = joint_angle(stroke, drive.parameters.static)
-    return _follow(boom, drive, angle, still, boom.clamped())
-
-
-def _follow(
-    boom: Boom, drive: Actuator, start: float, motion: Motion, clamped: ClampedBoom
-) -> MotionPlan:
-    rate = motion.rate
-    turned = np.append(0.0, np.cumsum(0.5 * STEP * (rate[1:] + rate[:-1])))
-    angle = start + turned
-    states, n = _states(clamped, motion.acceleration), len(clamped.drive)
-    between = 0.5 * (motion.acceleration[1:] + motion.acceleration[:-1])
-    acceleration = np.concatenate([[0.0], between, [0.0]])
-    bent, moving = states[:, :n], states[:, n:]
-    bending = np.outer(acceleration, clamped.drive)
-    bending -= bent * clamped.stiffness + moving @ clamped.damping.T
-    lifted = acceleration * clamped.rigid[0] + bending @ clamped.shapes[0]  # the rigid mode's q''
-    torque = (lifted + boom.weight[0] * np.cos(angle)) / boom.joint[0]
-    linkage = drive.parameters.static
-    shape = np.outer(np.cos(angle), boom.sag()) + bent @ clamped.shapes.T
-    stroke = np.array([piston_stroke(a, linkage) for a in angle])
+    bending = math.cos(angle) * float((boom.tip_angle - boom.joint) @ boom.sag())
+    still = (angle, stroke, bending, _holding(boom, drive, angle), 0.0)
+    angles, strokes, bendings, forces, deflections = (np.full(2, value) for value in still)
     return MotionPlan(
-        stiffness=drive.stiffness(float(stroke[0] + stroke[-1]) / 2.0),
-        angle=angle,
-        stroke=stroke,
-        bending=shape @ (boom.tip_angle - boom.joint),
-        force=torque / np.array([piston_velocity(1.0, a, linkage) for a in angle]),
-        deflection=motion.deflection,
+        drive.stiffness(stroke), 0.0, 1.0, angles, strokes, bendings, forces, deflections
     )
 
 
-def _states(boom: ClampedBoom, acceleration: Array) -> Array:
-    """Return (z, z'), (n + 1, 2 m), from rest under the joint's acceleration, (n,), in steps."""
-    m = len(boom.B)
-    held = expm(STEP * np.block([[boom.A, boom.B[:, None]], [np.zeros((1, m + 1))]]))
-    states = np.zeros((len(acceleration) + 1, m))
-    for k, value in enumerate(acceleration):
-        states[k + 1] = held[:m, :m] @ states[k] + held[:m, m] * value
-    return states
+def _holding(boom: Boom, drive: Actuator, angle: float) -> float:
+    """Return the piston force, N, that holds the boom at an angle, rad."""
+    arm = piston_velocity(1.0, angle, drive.parameters.static)
+    return boom.holding_torque * math.cos(angle) / arm

@@ -22,7 +22,7 @@ from emir_control.regulator import Regulator
 
 Array = NDArray[np.float64]
 
-EXCESS_WEIGHT = 3e-5  # m: excess of deflection that counts as one
+EXCESS_WEIGHT = 3e-4  # m: excess of deflection that counts as one
 BEND_UNIT = 1e-3  # m, of the rows of deflection
 SETTINGS = {  # nothing that depends on time or on the last solution
     "verbose": False, "adaptive_rho": 0, "warm_starting": False, "polishing": False,

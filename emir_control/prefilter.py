@@ -48,6 +48,14 @@ def valve_command(velocity: float, p: PrefilterParameters) -> float:
     return math.copysign(beyond, velocity)
 
 
+def commanded_velocity(command: float, p: PrefilterParameters) -> float:
+    """Return the steady piston velocity, m/s, of a valve command y2; the inverse of the above."""
+    opening = max(abs(command) - p.dead_zone, 0.0) / (1.0 - p.dead_zone)
+    if command > 0.0:
+        return opening * p.flow_lifting / p.area_lifting
+    return -opening * p.flow_lowering / p.area_lowering
+
+
 def piston_stroke(angle: float, p: PrefilterParameters) -> float:
     """Return the piston stroke, m, at a joint angle, rad; stroke 0 is at angle 0 (1)."""
     return _length(angle, p) - _length(0.0, p)

@@ -10,7 +10,7 @@ load that came or went; all change slowly. psi: the TCP's displacement per q. u 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,31 +28,66 @@ FLOOR = 1e-18  # of the process noise: what keeps the Riccati equation well pose
 
 
 @dataclass(frozen=True, kw_only=True)
+class NoiseParameters:
+    """What the Kalman filter reckons with: standard deviations, drifts from sample to sample."""
+
+    flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=3e-4)
+    load_drift: float = quantity("N", 1e-3, 1e6, "of p", default=0.2)
+    sudden_load: float = quantity(
+        "N", 1e-3, 1e6, "of p while a load seems to come or to go", default=100.0
+    )
+    force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=2e-5)
+    velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=2e-3)
+    angle_noise: float = quantity(
+        "rad", 1e-7, 0.1, "of the resolver; its steps are no white noise in a move", default=1.5e-3
+    )
+    bending_noise: float = quantity("rad", 1e-7, 0.1, "of the strain gauges", default=3e-5)
+    force_noise: float = quantity("N", 1.0, 1e6, "of the force by pressures", default=1.5e3)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+AT_REST = NoiseParameters(
+    flow_drift=1e-4,
+    load_drift=5.0,
+    sudden_load=30.0,
+    force_drift=1e-5,
+    velocity_noise=1e-3,
+    angle_noise=4.4e-4,
+)  # a resolver of 12 bits: a step over the root of 12
+
+
+@dataclass(frozen=True, kw_only=True)
 class RegulatorParameters:
     """Noise that the Kalman filter reckons with, and what the feedback weighs.
 
-    Of the weights the size that counts as one; drifts and noise are standard deviations, drifts
-    from sample to sample.
+    Of the weights the size that counts as one.
     """
 
     modes: int = quantity("1", 2, 16, "of the boom in the model", default=3)
     delay: float = quantity("s", 0.0, 0.2, "from measurement to valve current", default=0.0)
-    flow_drift: float = quantity("m/s", 1e-7, 1.0, "of d", default=1e-4)
-    load_drift: float = quantity("N", 1e-3, 1e6, "of p, at rest", default=5.0)
-    moving_load_drift: float = quantity("N", 1e-3, 1e6, "of p, moving", default=0.2)
-    force_drift: float = quantity("m", 1e-9, 1.0, "of f", default=1e-5)
-    velocity_noise: float = quantity("m/s", 1e-7, 1.0, "of u", default=1e-3)
-    angle_noise: float = quantity(
-        "rad", 1e-7, 0.1, "of the resolver; 12 bits of a turn", default=4.4e-4
-    )
-    bending_noise: float = quantity("rad", 1e-7, 0.1, "of the strain gauges", default=3e-5)
-    force_noise: float = quantity("N", 1.0, 1e6, "of the force by pressures", default=1.5e3)
+    moving: NoiseParameters = field(default_factory=NoiseParameters)
+    at_rest: NoiseParameters = AT_REST
     deflection_weight: float = quantity("m", 1e-5, 1.0, "dynamic deflection", default=1e-3)
-    position_weight: float = quantity("m", 1e-5, 1.0, "TCP off its place", default=1.5e-2)
-    velocity_weight: float = quantity("m/s", 1e-5, 1.0, "u off the plan", default=2.5e-3)
+    position_weight: float = quantity("m", 1e-5, 1.0, "TCP off its place", default=2e-2)
+    velocity_weight: float = quantity("m/s", 1e-5, 1.0, "u off the plan", default=4e-3)
 
     def __post_init__(self) -> None:
         check_ranges(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """A Kalman filter in its steady state.
+
+    gain, loaded: (n, 3), the latter while a load comes or goes. certainty: (3, 3), inverse
+    covariance of the innovation.
+    """
+
+    gain: Array
+    loaded: Array
+    certainty: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +95,7 @@ class Regulator:
     """x(k+1) = A x + B [u(k), u(k-1) ...], y = C x, with x = (q, q', s, f, d, p).
 
     modes: m in q. A: (n, n), n = 2 m + 4. B: (n, l + 1), for u now and l past ones. C: (3, n):
-    joint angle, rad, bending, rad, s, m. kalman, kalman_at_rest: (n, 3). feedback:
+    joint angle, rad, bending, rad, s, m. moving, at_rest: the filter of x. feedback:
     (2 m + 1 + l,), on w = (q, q', s, past u); w(k+1) = extended w + driven u. stage, cost:
     matrices of the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
     held: (2 m + 1,) where (q, q', s) rests under p = 1 N, the joint in its place.
@@ -70,8 +105,8 @@ class Regulator:
     A: Array
     B: Array
     C: Array
-    kalman: Array
-    kalman_at_rest: Array
+    moving: Filter
+    at_rest: Filter
     feedback: Array
     extended: Array
     driven: Array
@@ -129,8 +164,8 @@ def regulator(
         A=A,
         B=B,
         C=C,
-        kalman=_kalman(A, B, C, stiffness, p, p.moving_load_drift),
-        kalman_at_rest=_kalman(A, B, C, stiffness, p, p.load_drift),
+        moving=_filter((A, B, C), stiffness, p.moving),
+        at_rest=_filter((A, B, C), stiffness, p.at_rest),
         feedback=feedback,
         extended=extended,
         driven=driven[:, 0],
@@ -203,14 +238,22 @@ def _with_past(A: Array, B: Array, m: int) -> tuple[Array, Array]:
     return extended, driven
 
 
-def _kalman(  # noqa: PLR0913, PLR0917 (one linear system)
-    A: Array, B: Array, C: Array, stiffness: float, p: RegulatorParameters, load_drift: float
-) -> Array:
+def _filter(system: tuple[Array, Array, Array], stiffness: float, p: NoiseParameters) -> Filter:
+    gain, certainty = _kalman(*system, stiffness, p)
+    loaded, _ = _kalman(*system, stiffness, replace(p, load_drift=p.sudden_load))
+    return Filter(gain, loaded, certainty)
+
+
+def _kalman(
+    A: Array, B: Array, C: Array, stiffness: float, p: NoiseParameters
+) -> tuple[Array, Array]:
+    """Return the gain, (n, 3), and the inverse covariance of the innovation, (3, 3)."""
     driven = B.sum(axis=1)
     noise = p.velocity_noise**2 * np.outer(driven, driven) + FLOOR * np.eye(len(A))
     noise[-3, -3] += p.force_drift**2
     noise[-2, -2] += p.flow_drift**2
-    noise[-1, -1] += load_drift**2
+    noise[-1, -1] += p.load_drift**2
     sensors = np.diag([p.angle_noise, p.bending_noise, p.force_noise / stiffness]) ** 2
     P = solve_discrete_are(A.T, C.T, noise, sensors)
-    return np.asarray(np.linalg.solve(C @ P @ C.T + sensors, C @ P).T)
+    certainty = np.linalg.inv(C @ P @ C.T + sensors)
+    return P @ C.T @ certainty, certainty

@@ -1,7 +1,7 @@
 """What each signal of the topic table means, in words; recordings carry it beside path and unit."""
 
 from emir_msgs_py.robot_topics import JOINTS
-from emir_msgs_py.topics import OUTER_LOOPS, Topic
+from emir_msgs_py.topics import OUTER_LOOPS, VALVE_LOOPS, Topic
 
 MEANINGS = {
     "angle": "joint angle alpha_1, measured by the resolver",
@@ -59,6 +59,7 @@ LQG_MEANINGS = {
     "force": "unknown force on the piston, friction for one, estimated",
     "payload": "payload at the TCP, read from the piston force at rest",
     "deflection": "the TCP's dynamic deflection off the plan, estimated",
+    "limited": "1 where command or plan is held off an end of the stroke",
 }
 MEANINGS |= {
     f"{name}_{term}": text for name in ("lqg", "mpc") for term, text in LQG_MEANINGS.items()
@@ -70,6 +71,7 @@ MEANINGS |= {
 }
 MEANINGS |= {f"{name}_command": f"piston velocity that {name} asks for" for name in OUTER_LOOPS}
 MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in OUTER_LOOPS}
+MEANINGS |= {f"{name}_ready": f"1 where {name} may take over: at rest" for name in VALVE_LOOPS}
 MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
 
 

@@ -167,16 +167,28 @@ VELOCITY_COMMAND = Topic(
     "cylinder1",
     ("pfc_node", "pfc_tip_node", "selector_node"),
 )
-OUTER_LOOPS = tuple(  # their names; several at once: selector_node chooses, the others are ready
-    node.removesuffix("_node") for node in VELOCITY_COMMAND.publishers if node != "selector_node"
-)
-OFFERED_COMMANDS = {
-    name: Topic(
-        f"{name}/velocity_command", JOINT_STATE, f"{name}_node", "control", "command",
-        {f"{name}_command": Field("velocity[0]", "m/s")}, ("cylinder1",), "cylinder1",
+VALVE_LOOPS = ("lqg", "mpc")  # give the valve command, in the place of outer and force loop
+OUTER_LOOPS = (
+    tuple(  # their names; several at once: selector_node chooses, the others are ready
+        node.removesuffix("_node")
+        for node in VELOCITY_COMMAND.publishers
+        if node != "selector_node"
     )
-    for name in OUTER_LOOPS
-}  # fmt: skip
+    + VALVE_LOOPS
+)
+
+
+def _offered(name: str) -> Topic:
+    fields = {f"{name}_command": Field("velocity[0]", "m/s")}
+    if name in VALVE_LOOPS:
+        fields[f"{name}_ready"] = Field("position[0]", "1")
+    return Topic(
+        f"{name}/velocity_command", JOINT_STATE, f"{name}_node", "control", "command",
+        fields, ("cylinder1",), "cylinder1",
+    )  # fmt: skip
+
+
+OFFERED_COMMANDS = {name: _offered(name) for name in OUTER_LOOPS}
 SELECTOR_TERMS = named_numbers(
     "selector/terms",
     "selector_node",
@@ -193,7 +205,7 @@ VALVE_COMMAND = Topic(
     {"valve_command": Field("position[0]", "1")},
     ("valve1",),
     "cylinder1",
-    ("lqg_node", "mpc_node"),
+    tuple(f"{name}_node" for name in VALVE_LOOPS),
 )
 CASCADE_TERMS = named_numbers(
     "cascade/terms",
@@ -214,7 +226,7 @@ def _pfc_terms(name: str, output_unit: str) -> Topic:
 
 def _lqg_terms(name: str) -> Topic:
     terms = dict.fromkeys(("planned", "wanted", "flow"), "m/s")
-    terms |= {"force": "N", "payload": "kg", "deflection": "m"}
+    terms |= {"force": "N", "payload": "kg", "deflection": "m", "limited": "1"}
     units = {f"{name}_{term}": unit for term, unit in terms.items()}
     return named_numbers(f"{name}/terms", f"{name}_node", "control", units)
 

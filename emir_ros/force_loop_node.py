@@ -7,10 +7,10 @@ from emir_analysis.node_controls import ForceLoopControl, NodeControl, force_loo
 from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT, SELECTOR_TERMS
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
-from emir_ros.node_parameters import declare_robot, declare_tree, reject_unknown
+from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
 from emir_ros.shell import ControlNode, Signals
 
 LIVE = ("gain",)  # the prefilter has none of that name
@@ -35,6 +35,8 @@ class ForceLoopNode(ControlNode):
         super().__init__("force_loop_node", mine.inputs, mine.outputs, arguments, six)
         robot = self.model == ROBOT
         default: Any = force_loops(declare_robot(self)) if robot else ForceLoopParameters()
+        if declare(self, "standby", False, "of several controllers some may command the valve"):
+            self.take(SELECTOR_TERMS)
         parameters = declare_tree(self, default, live=LIVE)
 
         def tune(parameters: Any) -> None:

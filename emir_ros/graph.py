@@ -20,16 +20,15 @@ from emir_common.yaml_file import read_map
 from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
-from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS
+from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS, VALVE_LOOPS
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
-VALVE_CONTROLLERS = ("lqg", "mpc")  # give the valve command, no velocity: no switching
 CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
     for name in ("cascade", "pfc", "pfc_tip")
 }
-CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_CONTROLLERS}
+CONTROLLERS |= {name: ("trajectory_node", f"{name}_node") for name in VALVE_LOOPS}
 NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
@@ -70,8 +69,8 @@ class Plan:
     def nodes(self) -> tuple[str, ...]:
         """Return the names of the run's nodes, the plant last."""
         loops = dict.fromkeys(node for name in self.controllers for node in CONTROLLERS[name])
-        selector = ("selector_node",) if self.switches else ()
-        return ("recorder_node", *loops, *selector, "plant_node")
+        selector = ("selector_node", "force_loop_node") if self.switches else ()
+        return ("recorder_node", *dict.fromkeys((*loops, *selector)), "plant_node")
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -87,11 +86,7 @@ class Plan:
 def check(plan: Plan) -> None:
     """Raise ParameterError for what can be seen to be wrong before anything starts."""
     _check_model(plan)
-    for name in plan.controllers:
-        if name in VALVE_CONTROLLERS and plan.switches:
-            raise ParameterError(f"controller {name!r}: cannot be switched to or from")
-    if plan.controller not in VALVE_CONTROLLERS:
-        Selector(plan.controllers, _from_the_start(plan))
+    Selector(plan.controllers, _from_the_start(plan))
     if not re.fullmatch(r"([A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", plan.namespace, re.ASCII):
         raise ParameterError(
             f"namespace {plan.namespace!r}: letters, digits and _, not a digit first"
@@ -227,6 +222,7 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
     if plan.switches:
         nodes["selector_node"] = _selector_parameters(plan)
         nodes |= {f"{name}_node": {"standby": True} for name in plan.controllers}
+        nodes["force_loop_node"] = {"standby": not set(VALVE_LOOPS).isdisjoint(plan.controllers)}
     return {
         node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
         for node, values in nodes.items()

@@ -1,23 +1,16 @@
-"""mpc_node: model predictive control about a planned move; gives the valve command itself."""
+"""mpc_node: constrained predictive control of the boom about a planned move, on OSQP."""
 
-from collections.abc import Sequence
-
-from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import MpcControl
 from emir_control.mpc import Mpc
-from emir_plant.sheet import joint1
+from emir_ros.lqg_node import LqgNode
 from emir_ros.main import run
-from emir_ros.node_parameters import declare_tree, reject_unknown
-from emir_ros.shell import ControlNode
 
 
-class MpcNode(ControlNode):
+class MpcNode(LqgNode):
     """Reference, move, joint_states, pressures, boom_deflection -> valve_command, mpc/terms."""
 
-    def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("mpc_node", MpcControl.inputs, MpcControl.outputs, arguments)
-        self.law = MpcControl(Mpc(declare_tree(self, lqg_parameters(joint1()))))
-        reject_unknown(self)
+    control_class = MpcControl
+    law_class = Mpc
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ class SelectorNode(ControlNode):
     @property
     def chosen(self) -> str:
         """Return who drives."""
-        return self.state.name if self.state else self.law.first
+        return self.state.drives if self.state else self.law.first
 
     def stale(self, missing: Sequence[str]) -> None:
         """Publish nothing; who was chosen stays so."""
@@ -61,8 +61,10 @@ class SelectorNode(ControlNode):
         return (OFFERED_COMMANDS[self.chosen].name,)
 
     def status(self) -> str:
-        """Return who drives."""
-        return f"{self.chosen} drives the machine"
+        """Return who drives, and who will."""
+        name = self.state.name if self.state else self.chosen
+        waits = f"; {name} will, at rest" if name != self.chosen else ""
+        return f"{self.chosen} drives the machine{waits}"
 
     def _check(self, name: str) -> None:
         if name not in self.selector.controllers:

@@ -27,6 +27,7 @@ from emir_msgs_py.topics import (
     PLANT_PERIOD_NS,
     ROBOT,
     SELECTOR_TERMS,
+    VALVE_COMMAND,
     VELOCITY_COMMAND,
     Topic,
 )
@@ -298,7 +299,8 @@ class ControlNode(Shell):
         return Ready(self._own, control) if self._standby else control
 
     def _offered(self, topic: Topic) -> Topic:
-        return OFFERED_COMMANDS[self._own] if topic is VELOCITY_COMMAND else topic
+        commands = VELOCITY_COMMAND, VALVE_COMMAND
+        return OFFERED_COMMANDS[self._own] if topic in commands else topic
 
     def _hear_selector(self) -> None:
         """Take what was applied in the last period as an input; in the first there is none."""
@@ -419,7 +421,12 @@ class ControlNode(Shell):
                 Level.ERROR, f"{self.consequence}: {', '.join(bad)} {verb} not a number"
             )
         else:
-            self.diagnostics.say(Level.OK, self.status())
+            caution = self.caution(outputs)
+            self.diagnostics.say(Level.WARN if caution else Level.OK, caution or self.status())
+
+    def caution(self, outputs: Signals) -> str:
+        """Return why the outputs are not what was asked for, if they are not."""
+        return ""
 
     def status(self) -> str:
         """Return what there is to say while all is well."""

@@ -33,7 +33,7 @@ def generate_launch_description() -> LaunchDescription:
     parameters = [f"{config}/", LaunchConfiguration("model"), ".yaml"]
     controller, second = LaunchConfiguration("controller"), LaunchConfiguration("standby")
     two = NotEqualsSubstitution(second, "")
-    if_two = IfCondition(two)
+    if_two, as_bool = IfCondition(two), ParameterValue(two, value_type=bool)
     return LaunchDescription(
         [
             _argument("bag", None, "folder of the recording; must not exist"),
@@ -45,8 +45,8 @@ def generate_launch_description() -> LaunchDescription:
             _argument("transforms", "false", "frames on /tf, by robot_state_publisher"),
             _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
             _node("plant_node"),
-            _node("force_loop_node", None, IfCondition(_gives_velocity(controller))),
-            _node([controller, "_node"], {"standby": ParameterValue(two, value_type=bool)}),
+            _node("force_loop_node", {"standby": as_bool}, _if_damped(controller, second)),
+            _node([controller, "_node"], {"standby": as_bool}),
             _node([second, "_node"], {"standby": True}, if_two),
             _node("selector_node", {"controller": controller}, if_two),
             _node("trajectory_node"),
@@ -74,9 +74,10 @@ def _transforms() -> Node:
     )
 
 
-def _gives_velocity(controller: LaunchConfiguration) -> PythonExpression:
-    """Tell whether the force loop is needed: lqg and mpc give the valve command themselves."""
-    return PythonExpression(["'", controller, "' not in ('lqg', 'mpc')"])
+def _if_damped(controller: LaunchConfiguration, second: LaunchConfiguration) -> IfCondition:
+    """Return whether the force loop is there: lqg or mpc alone gives the valve command itself."""
+    words = ["'", second, "' != '' or '", controller, "' not in ('lqg', 'mpc')"]
+    return IfCondition(PythonExpression(words))
 
 
 def _argument(

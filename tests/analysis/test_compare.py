@@ -178,9 +178,13 @@ def test_trade_off_of_conventional_control(
     monkeypatch.setattr(trade_off, "GAINS", (1.0, 2.0))
     monkeypatch.setattr(trade_off, "TIME_CONSTANTS", (0.1, 0.4))
     image = tmp_path / "curve.png"
-    assert main(["compare", "--trade-off", "--picture", str(image)]) == 0
-    rows = [line.strip("|").split("|") for line in capsys.readouterr().out.splitlines()[2:]]
-    by_tuning = {(float(row[0]), float(row[1])): [float(cell) for cell in row[2:]] for row in rows}
+    words = ["compare", "--trade-off", "--controllers", "lqg", "--picture", str(image)]
+    assert main(words) == 0
+    rows = [line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:]]
+    *rows, lqg = rows
+    assert lqg[0].strip() == "lqg"
+    by_tuning = {(float(row[1]), float(row[2])): [float(cell) for cell in row[3:]] for row in rows}
+    assert float(lqg[5]) < min(bent for _, _, bent, _ in by_tuning.values())
     for gain in (1.0, 2.0):
         (quick, _, bent, _), (slow, _, less_bent, _) = by_tuning[gain, 0.1], by_tuning[gain, 0.4]
         assert quick < slow

@@ -56,7 +56,7 @@ def _spectral_radius(law: Regulator, real: Regulator, stiffness: float) -> float
         x, u_past, estimate = np.split(unit, (m, m + past))
         measured = real.C[:, :m] @ x
         measured[2] *= stiffness
-        estimate = estimate + law.kalman @ (measured - law.C @ estimate)
+        estimate = estimate + law.moving.gain @ (measured - law.C @ estimate)
         off = np.append(estimate[: law.controlled], u_past + estimate[law.flow])
         off[law.controlled - 1] -= estimate[law.force]
         u = -estimate[law.flow] - law.feedback @ off

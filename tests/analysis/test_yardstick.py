@@ -73,6 +73,25 @@ def test_drive_of_the_controllers_is_the_machines(opening: float) -> None:
     assert pushed == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.parametrize("opening", [-0.4, 0.4])
+def test_pressures_ahead_are_the_machines(opening: float) -> None:
+    """A control period of the plant with its valve held open, by its own velocity."""
+    machine = joint1()
+    plant, drive = Plant(machine), Actuator(actuator(machine))
+    state, command = plant.initial(0.7, 30e5), drive.command(opening)
+    state[core.SPOOL], state[core.LOGIC] = command, 1.0
+    before = plant.outputs(state)
+    oil = Oil(before.stroke, before.pressure_lifting, before.pressure_lowering)
+    for _ in range(4):
+        state, after = plant.step(state, command, 0.008)
+        velocity = (after.stroke - oil.stroke) / 0.008
+        oil = drive.ahead(oil, opening, velocity, 0.008)
+    changed = after.pressure_lifting - before.pressure_lifting
+    assert oil.lifting - before.pressure_lifting == pytest.approx(changed, rel=0.03)
+    changed = after.pressure_lowering - before.pressure_lowering
+    assert oil.lowering - before.pressure_lowering == pytest.approx(changed, rel=0.03)
+
+
 def test_draws_are_repeatable_and_within_their_ranges() -> None:
     first, again = (list(draws(joint1(), 5, 3)) for _ in range(2))
     assert first == again

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from emir_analysis.closed_loop import PERIOD, ClosedLoop
+from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
+    LqgControl,
     PfcControl,
     PfcTipControl,
     Signals,
@@ -20,10 +22,11 @@ from emir_analysis.node_controls import (
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.limits import LimitParameters, off_the_ends
+from emir_control.lqg import Lqg, LqgInputs
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
-from emir_control.trajectory import Reference, TrajectoryParameters, named
+from emir_control.trajectory import NO_MOVE, Reference, TrajectoryParameters, named
 from emir_msgs_py.topics import CYLINDER_REFERENCE
 from emir_plant import linkage
 from emir_plant.plant import Plant
@@ -157,3 +160,40 @@ def test_the_limits_are_the_machines_stroke() -> None:
 def test_limits_that_leave_no_stroke_are_refused() -> None:
     with pytest.raises(ParameterError, match="leaves nothing above stroke_low"):
         LimitParameters(stroke_low=0.5, stroke_high=0.51)
+
+
+@pytest.mark.parametrize(("degrees", "name"), [(74.0, "lift-lower"), (8.0, "lower-lift")])
+def test_a_plan_that_would_end_at_the_end_of_the_stroke_ends_at_the_margin(
+    degrees: float, name: str
+) -> None:
+    """LQG plans what is left of the move, says that it does, and comes back."""
+    trajectory = named(name, TrajectoryParameters(distance=0.2, speed=0.03, pause=4.0))
+    outer = LqgControl(Lqg(lqg_parameters(joint1())))
+    run = ClosedLoop(Plant(joint1()), trajectory, outer).run(
+        math.radians(degrees), 2e6, trajectory.duration
+    )
+    lifting = name == "lift-lower"
+    line = LIMITS.stroke_high - LIMITS.end_margin if lifting else LIMITS.end_margin
+    stroke, reference = run["true_stroke"], run["reference_stroke"]
+    beyond = reference.max() - line if lifting else line - reference.min()
+    assert beyond > 0.03
+    assert (stroke.max() if lifting else stroke.min()) == pytest.approx(line, abs=5e-3)
+    assert stroke[-1] == pytest.approx(stroke[0], abs=1e-2)
+    limited = run["lqg_limited"]
+    assert limited.max() == 1.0
+    assert limited[:10].max() == 0.0
+
+
+def test_lqg_is_held_off_the_end_whatever_it_wants() -> None:
+    """Its force at rest says less than there is: it would drive the piston on."""
+    law = Lqg(lqg_parameters(joint1()))
+    plant = Plant(joint1())
+    state = plant.initial(math.radians(85.0), 2e6)
+    from emir_plant.sensors import measure
+
+    reading = measure(plant, plant.outputs(state), 0, state)
+    inputs = LqgInputs(reading.stroke, NO_MOVE, *reading[:1], *reading[2:4], reading.deflection)
+    held = law.initial(inputs)
+    angle = linkage.angle(LIMITS.stroke_high, plant.record[0])
+    _, outputs = law.step(held, inputs._replace(reference=2.0, angle=angle), PERIOD)
+    assert outputs.wanted <= 0.0

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.closed_loop import TICKS, ClosedLoop
+from emir_analysis.compare import dynamic_deflection
+from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
+    LqgControl,
     NodeControl,
     PfcControl,
     PfcTipControl,
@@ -20,8 +23,10 @@ from emir_analysis.switching import Ready, Selector, Switch, SwitchedLoop
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.cascade import Cascade, CascadeParameters
+from emir_control.lqg import Lqg
 from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
+from emir_control.prefilter import PrefilterParameters, commanded_velocity
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.plant import Plant
@@ -124,3 +129,46 @@ def test_a_plan_of_switching_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=said):
         Selector(controllers, tuple(Switch(*switch) for switch in switches))
+
+
+@pytest.fixture(scope="module")
+def by_way_of_lqg() -> dict[str, np.ndarray]:
+    """Cascade, LQG asked for in mid-move, PFC asked for in the middle of LQG's own move."""
+    lqg = LqgControl(Lqg(lqg_parameters(joint1())))
+    controls = {"cascade": CONTROLS["cascade"], "lqg": lqg, "pfc": CONTROLS["pfc"]}
+    back = 1.0 + 3.3 + 5.0  # s, when the way back begins
+    switches = Switch(0.0, "cascade"), Switch(2.5, "lqg"), Switch(back + 1.6, "pfc")
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
+    return loop.run(math.pi / 4, 2e6, 17.6)
+
+
+def test_lqg_takes_over_when_the_machine_rests(by_way_of_lqg: dict[str, np.ndarray]) -> None:
+    run = by_way_of_lqg
+    first = int(np.argmax(run["lqg_active"]))
+    assert first * 0.032 > 4.3 + 1.0  # asked for at 2.5 s; the reference rests from 4.3 s on
+    assert run["move_since"][first] < -1.0  # the next move is not near
+    assert run["lqg_ready"][first] == 1.0
+    assert run["valve_command"][first] == 0.0
+    swing, tick = abs(dynamic_deflection(run)), first * TICKS
+    assert swing[tick : tick + 200].max() < 1.2 * swing[tick - 125 : tick].max()  # 1.6 s, 1 s
+    assert run["lqg_payload"][first] == pytest.approx(0.0, abs=30.0)
+
+
+def test_lqg_hands_its_command_on_and_over_in_mid_move(
+    by_way_of_lqg: dict[str, np.ndarray],
+) -> None:
+    """While it drives, the force loop neither damps nor limits; PFC goes on from its command."""
+    run = by_way_of_lqg
+    drives = run["lqg_active"] == 1.0
+    assert np.all(run["force_feedback"][drives] == 0.0)
+    p = PrefilterParameters()
+    expected = [commanded_velocity(each, p) for each in run["valve_command"][drives]]
+    assert run["lqg_command"][drives] == pytest.approx(expected, abs=1e-12)
+    last = int(np.flatnonzero(drives)[-1])
+    velocity, valve = run["velocity_command"], run["valve_command"]
+    assert velocity[last] < -0.015  # it lowers
+    assert run["pfc_active"][last + 1] == 1.0
+    assert velocity[last + 1] == pytest.approx(velocity[last], abs=1e-9)
+    assert valve[last + 1] == pytest.approx(valve[last], abs=0.04)
+    assert run["true_stroke"][-1] == pytest.approx(run["reference_stroke"][-1], abs=3e-3)

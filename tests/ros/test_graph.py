@@ -170,6 +170,34 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
         assert same(replay(bag, node, {})), node
 
 
+def test_switching_by_way_of_lqg_in_lock_step_equals_the_plain_loop(tmp_path: Path) -> None:
+    """LQG begins, PFC goes on while it lifts: the force loop hands on, then damps."""
+    bag = tmp_path / "run"
+    words = ["--controller", "lqg", "--switch", "2.5=pfc", "--duration", "3.2"]
+    assert run_graph([*words, "--bag", str(bag)]) == 0
+    controls = {
+        "lqg": LqgControl(Lqg(lqg_parameters(joint1()))),
+        "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
+    }
+    switches = (Switch(0.0, "lqg"), Switch(2.5, "pfc"))
+    trajectory = named("lift-lower", TrajectoryParameters())
+    loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
+    expected = loop.run(math.pi / 4, 2e6, 3.2)
+    recorded = _read_with_rosbags(bag)
+    plan = Plan(bag=bag, controller="lqg", switches=switches[1:])
+    names = [name for name in plan.topics if f"/{name}" in recorded]
+    assert {"lqg/velocity_command", "force_loop/terms", "selector/terms"} <= set(names)
+    for topic in map(by_name, names):
+        for name in topic.fields:
+            values = [
+                conversions.values(topic, message)[name]
+                for _, message in recorded[f"/{topic.name}"]
+            ]
+            assert np.array_equal(values, expected[name]), name
+    for node in ("lqg", "pfc", "force_loop"):
+        assert same(replay(bag, node, {})), node
+
+
 def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
     files = []
     for name in ("first", "second"):

@@ -13,7 +13,14 @@ from emir_analysis.diagnosis.pictures import (
     free_runs_picture,
     shape_picture,
 )
-from emir_analysis.diagnosis.result import TOLD, Diagnosis, EffectResult, ParameterResult
+from emir_analysis.diagnosis.result import (
+    TOLD,
+    Diagnosis,
+    EffectResult,
+    ErrorTests,
+    ParameterResult,
+    SignalResult,
+)
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
@@ -35,7 +42,12 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
         *_balances(findings, result),
         *_candidates(result),
         *_parameters(findings, result),
-        *_errors(result),
+        *error_tests(
+            {name: shown[0] for name, shown in SHOWN.items()},
+            result.signals,
+            result.one_step,
+            result.tests,
+        ),
         *_control(result),
     ]
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
@@ -174,15 +186,21 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
     ]
 
 
-def _errors(result: Diagnosis) -> list[Block]:
+def error_tests(
+    names: dict[str, str],
+    signals: dict[str, SignalResult],
+    one_step: dict[str, SignalResult],
+    all_tests: dict[str, ErrorTests],
+) -> list[Block]:
+    """Return what is said of each signal's errors; names: what the signals are called."""
     rows: list[tuple[str | float, ...]] = []
-    for name, tests in result.tests.items():
-        ahead, noise = result.one_step[name], result.signals[name].noise
+    for name, tests in all_tests.items():
+        ahead, noise = one_step[name], signals[name].noise
         for stage in ("nominal", "refitted", "with_effect", "black_box"):
             bounds = tests.intervals[stage]
             rows.append(
                 (
-                    SHOWN[name][0],
+                    names[name],
                     stage.replace("_", " "),
                     bounds.low / noise,
                     bounds.high / noise,

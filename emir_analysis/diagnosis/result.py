@@ -1,9 +1,10 @@
 """The result of a diagnosis as values, as JSON and as lines of text."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from emir_analysis.diagnosis.telling import movement, untold
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
@@ -169,7 +173,7 @@ def diagnosis(
 _STEP_NOISE = np.array([np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0), 1.0])
 
 
-def write_json(path: Path, result: Diagnosis) -> None:
+def write_json(path: Path, result: "DataclassInstance") -> None:
     """Write the result as JSON, numbers that do not exist as null.
 
     Raises InputError when the file cannot be written.
@@ -250,18 +254,26 @@ def _tell_apart(findings: Findings) -> str | None:
 def _parameters(trial: Trial) -> dict[str, ParameterResult]:
     members = trial.unknowns.members
     spread = trial.spread
-    correlation = np.nan_to_num(trial.covariance / np.outer(spread, spread))
+    together = confounded([member.path for member in members], trial.covariance)
     result = {}
     for k, (unknown, x) in enumerate(zip(members, trial.x, strict=True)):
         low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
-        with_it = tuple(
-            other.path
-            for j, other in enumerate(members)
-            if j != k and abs(correlation[k, j]) > CONFOUNDED
-        )
         value = unknown.value(float(x))
+        with_it = together[unknown.path]
         result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
     return result
+
+
+def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, ...]]:
+    """Return with which other parameters' values each one's goes up or down."""
+    spread = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    correlation = np.nan_to_num(covariance / np.outer(spread, spread))
+    return {
+        path: tuple(
+            other for j, other in enumerate(paths) if j != k and abs(correlation[k, j]) > CONFOUNDED
+        )
+        for k, path in enumerate(paths)
+    }
 
 
 def _effects(findings: Findings, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:

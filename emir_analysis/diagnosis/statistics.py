@@ -25,9 +25,9 @@ class Interval:
     high: float
 
 
-def rms_intervals(error: Array, period: float) -> list[Interval]:
-    """Return the interval of each column's RMS, error (n, c), by block bootstrap."""
-    size = max(1, round(BLOCK / period))
+def rms_intervals(error: Array, period: float, block: float = BLOCK) -> list[Interval]:
+    """Return the interval of each column's RMS, error (n, c), by bootstrap of blocks, s."""
+    size = max(1, round(block / period))
     count = max(1, len(error) // size)
     blocks = np.array([np.mean(part**2, axis=0) for part in np.array_split(error, count)])
     drawn = np.random.default_rng(0).integers(0, count, (DRAWS, count))

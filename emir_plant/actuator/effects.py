@@ -181,16 +181,15 @@ class ExternalLoad(Effect):
 
 @dataclass(frozen=True)
 class ElasticBoom(Effect):
-    """Most of the mass moves behind a spring: an elastic arm."""
+    """The mass moves behind a spring, an elastic arm; beside it the piston has none."""
 
     balance: ClassVar[Balance] = "force"
-    sizes: ClassVar[tuple[str, ...]] = ("mass_ratio",)
-    source: ClassVar[str] = "first bending mode, lightly damped"
-    trial: ClassVar[dict[str, float]] = {"mass_ratio": 3.0, "frequency": 0.4, "damping": 0.05}
+    sizes: ClassVar[tuple[str, ...]] = ("compliance",)
+    source: ClassVar[str] = "first bending mode; slender arms are softer than the oil"
+    trial: ClassVar[dict[str, float]] = {"compliance": 1.0, "damping": 0.1}
 
-    mass_ratio: float = quantity("1", 0.0, 20.0, "arm over piston", default=0.0)
-    frequency: float = quantity("rad/time", 0.01, 20.0, "of the arm, piston held", default=0.4)
-    damping: float = quantity("1", 1e-3, 0.5, "of critical", default=0.05)
+    compliance: float = quantity("1", 0.0, 20.0, "of the arm over that of the oil", default=0.0)
+    damping: float = quantity("1", 0.02, 0.5, "of critical, of mass and arm", default=0.1)
 
 
 @dataclass(frozen=True)

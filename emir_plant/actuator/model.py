@@ -3,10 +3,14 @@
     spool      T dy/dt = u - y
     flow       Q = gain o(y)
     oil        dp/dt = Q - w - leakage
-    mass       dw/dt = omega^2 (p - friction(w) - load) - spring forces of arm and swinging load
+    mass       dw/dt = omega^2 (p - friction(w) - load) - force of the swinging load
 
 p: pressure above that at rest, w: velocity as a flow, o: opening behind play, delay, offset and
-overlap. One unit of flow raises the pressure by one per unit of time.
+overlap. One unit of flow raises the pressure by one per unit of time. With an elastic arm the
+mass's velocity is another one, a, and the light piston's follows from p = friction(w) + load + f:
+
+    arm        f = s / compliance + d (w - a),   ds/dt = w - a
+    mass       da/dt = omega^2 f - force of the swinging load
 """
 
 from functools import cache
@@ -21,7 +25,8 @@ from emir_plant.jit import compiled
 
 Array = NDArray[np.float64]
 
-STEPS = 2  # of the integration between two samples
+STEPS = 2  # of the integration between two samples, at least
+RESOLVED = 2.0  # of the fastest rate times a step; RK4 is stable up to 2.8
 STATES = 8
 SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
 NOWHERE = 1e6  # a pressure that only a run out of all bounds has
@@ -111,9 +116,45 @@ def _orifice(drop: float) -> float:
 
 
 @compiled
+def _friction(velocity: float, p: Any) -> float:
+    """Return what resists a velocity, as a pressure."""
+    resisting = p.load_viscous_friction * velocity
+    resisting += p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
+    if p.effects_coulomb_friction_force > 0.0:
+        resisting += p.effects_coulomb_friction_force * np.tanh(velocity / SMOOTH)
+    return resisting
+
+
+@compiled
+def _damper(p: Any) -> float:
+    """Return the elastic arm's damping, pressure per velocity."""
+    stiffness = 1.0 / p.effects_elastic_boom_compliance
+    return 2.0 * p.effects_elastic_boom_damping * np.sqrt(stiffness) / p.load_frequency
+
+
+@compiled
+def _steps(p: Any, period: float) -> int:
+    """Return the steps between two samples that resolve a light piston on the oil."""
+    if p.effects_elastic_boom_compliance == 0.0:
+        return STEPS
+    fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
+
+
+@compiled
+def _light_piston(pressure: float, damper: float, p: Any) -> float:
+    """Return the velocity at which friction and the arm's damper resist with this pressure."""
+    moving = max(abs(pressure) - p.effects_coulomb_friction_force, 0.0)
+    linear = p.load_viscous_friction + damper
+    turbulent = p.effects_turbulent_resistance_coefficient
+    # the root of turbulent v^2 + linear v = moving, without cancellation
+    speed = 2.0 * moving / (linear + np.sqrt(linear * linear + 4.0 * turbulent * moving))
+    return speed if pressure > 0.0 else -speed
+
+
+@compiled
 def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
     """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
-    velocity = x[VELOCITY]
     flow = _flow(x[SPOOL], pressure, p)
     relief = 0.0
     if p.effects_relief_valve_high > 0.0:
@@ -121,34 +162,30 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     if p.effects_relief_valve_low > 0.0:
         relief -= RELIEF * max(-pressure - p.effects_relief_valve_low, 0.0)
     leakage = p.effects_internal_leakage_conductance * pressure + relief
-    resisting = (
-        p.load_viscous_friction * velocity
-        + p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
-        + p.effects_external_load_force
-        + p.effects_external_load_gradient * x[WAY]
-    )
-    if p.effects_coulomb_friction_force > 0.0:
-        resisting += p.effects_coulomb_friction_force * np.tanh(velocity / SMOOTH)
-    arm = p.effects_elastic_boom_frequency
-    pull = arm * arm * x[ARM_WAY]
-    pull += 2.0 * p.effects_elastic_boom_damping * arm * (velocity - x[ARM])
-    elastic = p.effects_elastic_boom_mass_ratio > 0.0
-    carrier = x[ARM] if elastic else velocity
+    mass = p.load_frequency * p.load_frequency
+    load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
+    if p.effects_elastic_boom_compliance > 0.0:
+        damper = _damper(p)
+        spring = x[ARM_WAY] / p.effects_elastic_boom_compliance
+        velocity = _light_piston(pressure - load - spring + damper * x[ARM], damper, p)
+        carrier = x[ARM]
+        slope[VELOCITY] = 0.0
+        slope[ARM] = mass * (spring + damper * (velocity - carrier))
+        slope[ARM_WAY] = velocity - carrier
+    else:
+        velocity = x[VELOCITY]
+        carrier = velocity
+        slope[VELOCITY] = mass * (pressure - load - _friction(velocity, p))
+        slope[ARM] = 0.0
+        slope[ARM_WAY] = 0.0
     swing = p.effects_swinging_load_frequency
     tug = swing * swing * x[SWING_WAY]
     tug += 2.0 * p.effects_swinging_load_damping * swing * (carrier - x[SWING])
-    on_carrier = p.effects_swinging_load_mass_ratio * tug
+    moved = ARM if p.effects_elastic_boom_compliance > 0.0 else VELOCITY
+    slope[moved] -= p.effects_swinging_load_mass_ratio * tug
     slope[SPOOL] = (command - x[SPOOL]) / p.valve_time_constant
     slope[PRESSURE] = flow - velocity - leakage
-    slope[VELOCITY] = p.load_frequency * p.load_frequency * (pressure - resisting)
-    if elastic:
-        slope[VELOCITY] -= p.effects_elastic_boom_mass_ratio * pull
-        slope[ARM] = pull - on_carrier
-    else:
-        slope[VELOCITY] -= on_carrier
-        slope[ARM] = 0.0
     slope[WAY] = velocity
-    slope[ARM_WAY] = velocity - x[ARM] if elastic else 0.0
     slope[SWING] = tug
     slope[SWING_WAY] = carrier - x[SWING]
     return flow
@@ -189,7 +226,8 @@ def _run(parameters: Any, command: Any, measured: Any, period: float, start: flo
     x, y = np.zeros(STATES), np.zeros(STATES)
     a, b, c, d = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES)
     free = measured.size == 0
-    h = period / STEPS
+    steps = _steps(p, period)
+    h = period / steps
     lag = p.effects_command_delay_delay / period
     play = p.effects_valve_hysteresis_play
     line = p.effects_line_resistance_coefficient
@@ -201,8 +239,8 @@ def _run(parameters: Any, command: Any, measured: Any, period: float, start: flo
         seen = _loss(_flow(x[SPOOL], now, p), line)
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
-        for j in range(STEPS):
-            time = k + (j + 0.5) / STEPS
+        for j in range(steps):
+            time = k + (j + 0.5) / steps
             wanted = _at(command, time - lag)
             held = min(max(held, wanted - play), wanted + play)
             oil = 0.0

@@ -77,6 +77,12 @@ def test_an_effect_is_found_and_carries_to_the_other_recording(
     assert written["signals"]["oil_pressure"].keys() == {
         "unit", "noise", "nominal", "refitted", "with_effect", "black_box",
     }  # fmt: skip
+    tests = result.tests["oil_pressure"]
+    for stage in ("nominal", "refitted", "with_effect", "black_box"):
+        inside = tests.intervals[stage]
+        assert inside.low <= getattr(signal, stage) <= inside.high
+    ahead = result.one_step["oil_pressure"]
+    assert ahead.with_effect < 1.2 * ahead.noise < ahead.nominal
     assert written["balances"]["oil"].keys() == {"unit", "noise", "before", "refitted", "after"}
     assert (folder / "found.html").read_text().count("<img") == 1
     model = load_actuator(folder / "model.yaml").machine
@@ -122,3 +128,6 @@ def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> No
     plain = fit(sheet, (), record, sheet.machine, restarts=8)
     limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, plain.machine, restarts=8)
     assert limited.rms < 0.7 * plain.rms < 0.7 * np.std(record.pressure)
+    both = ("flow_limit", "turbulent_resistance", "elastic_boom", "swinging_load")
+    behind = fit(sheet, both, record, limited.machine, restarts=3)
+    assert behind.rms < 0.9 * limited.rms

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, quantities
@@ -31,31 +32,36 @@ def _with(effect: str, **values: float) -> Actuator:
 
 def test_free_run_agrees_with_an_independent_solver() -> None:
     machine = with_values(PLAIN, {
-        "effects.elastic_boom.mass_ratio": 3.0, "effects.elastic_boom.frequency": 0.4,
-        "effects.elastic_boom.damping": 0.05, "effects.swinging_load.mass_ratio": 0.1,
+        "effects.elastic_boom.compliance": 1.5,
+        "effects.elastic_boom.damping": 0.1, "effects.swinging_load.mass_ratio": 0.1,
         "effects.swinging_load.frequency": 0.2, "effects.swinging_load.damping": 0.01,
         "effects.turbulent_resistance.coefficient": 0.3, "effects.valve_null_offset.offset": 0.05,
         "effects.internal_leakage.conductance": 0.02, "effects.external_load.force": 0.1,
         "effects.command_delay.delay": 2.5, "effects.line_resistance.coefficient": 0.5,
     })  # fmt: skip
 
+    damper = 2.0 * 0.1 / (0.3 * np.sqrt(1.5))
+
     def slope(t: float, x: np.ndarray) -> list[float]:
-        spool, oil, piston, arm, arm_way, swing, swing_way = x
+        spool, oil, arm, spring, swing, swing_way = x
         flow = 1.5 * (spool + 0.05)
-        pull = 0.4**2 * arm_way + 2 * 0.05 * 0.4 * (piston - arm)
+
+        def surplus(piston: float) -> float:  # of the pressure, beside a piston without mass
+            friction = 0.4 * piston + 0.3 * piston * abs(piston)
+            return oil - 0.1 - friction - spring / 1.5 - damper * (piston - arm)
+
+        piston = brentq(surplus, -50.0, 50.0, xtol=1e-12)
         tug = 0.2**2 * swing_way + 2 * 0.01 * 0.2 * (arm - swing)
-        force = oil - 0.4 * piston - 0.3 * piston * abs(piston) - 0.1
         return [
             (np.interp(t - 2.5, TIME, OPENING) - spool) / 2.0,
             flow - piston - 0.02 * oil,
-            0.3**2 * force - 3.0 * pull,
-            pull - 0.1 * tug,
+            0.3**2 * (spring / 1.5 + damper * (piston - arm)) - 0.1 * tug,
             piston - arm,
             tug,
             arm - swing,
         ]
 
-    run = solve_ivp(slope, (0, 299), np.zeros(7), t_eval=TIME, max_step=0.25, rtol=1e-8)
+    run = solve_ivp(slope, (0, 299), np.zeros(6), t_eval=TIME, max_step=0.25, rtol=1e-8)
     flow = 1.5 * (run.y[0] + 0.05)
     expected = run.y[1] + 0.5 * flow * np.abs(flow)
     np.testing.assert_allclose(simulate(machine, OPENING, 1.0), expected, atol=0.02)
@@ -87,6 +93,26 @@ def test_a_flow_limit_limits_the_steady_velocity_and_so_the_pressure() -> None:
     opening = np.minimum(TIME / 20.0, 1.0)
     settled = simulate(_with("flow_limit", lifting=0.6), opening, 1.0)[-1]
     assert settled == pytest.approx(0.4 * 0.6, rel=0.05)  # pressure = friction * flow
+
+
+def test_an_arm_softer_than_the_oil_swings_as_slowly_as_both_springs_in_series() -> None:
+    machine = with_values(PLAIN, {
+        "load.viscous_friction": 0.0, "effects.elastic_boom.compliance": 3.0,
+        "effects.elastic_boom.damping": 0.02,
+    })  # fmt: skip
+    opening = np.interp(TIME, [0, 1, 2], [1.0, 1.0, 0.0])  # a jolt, then shut
+    free = simulate(machine, opening, 1.0)[60:]
+    crossings = np.flatnonzero((free[:-1] < free.mean()) & (free[1:] >= free.mean()))
+    period = float(np.mean(np.diff(crossings)))
+    assert 2.0 * np.pi / period == pytest.approx(0.3 / np.sqrt(1.0 + 3.0), rel=0.05)
+
+
+def test_dry_friction_holds_a_light_piston_until_the_pressure_exceeds_it() -> None:
+    still = {"effects.elastic_boom.compliance": 1.0, "effects.coulomb_friction.force": 0.5}
+    for force, moves in ((0.49, False), (0.51, True)):
+        machine = with_values(PLAIN, still | {"effects.external_load.force": force})
+        way = np.abs(simulate(machine, 0.0 * TIME, 1.0)).max()
+        assert (way > 0.0) == moves
 
 
 def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:

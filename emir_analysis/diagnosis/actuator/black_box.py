@@ -3,6 +3,7 @@
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
@@ -27,6 +28,18 @@ def linear_run(model: Array, opening: Array) -> Array:
     return np.asarray(lfilter(model[0], model[1], opening - opening[0]))
 
 
+def one_step_error(record: ActuatorRecord, judged: ActuatorRecord) -> Array:
+    """Return the errors (n,) one sample ahead of the linear model that predicts best.
+
+    Its order and delay are those of the best fit on `record`; zero for the first few samples.
+    """
+    _, order, delay = min(
+        (float(np.mean(_ahead(record, o, d, _equation_error(record, o, d)) ** 2)), o, d)
+        for o, d in product(ORDERS, DELAYS)
+    )
+    return _ahead(judged, order, delay, _equation_error(record, order, delay))
+
+
 def _output_error(record: ActuatorRecord, order: int, delay: int) -> tuple[float, Array]:
     size = 1 + max(order, order + delay - 1)
 
@@ -47,9 +60,21 @@ def _output_error(record: ActuatorRecord, order: int, delay: int) -> tuple[float
 
 
 def _equation_error(record: ActuatorRecord, order: int, delay: int) -> Array:
-    """Return the coefficients that predict one step best: where the search starts."""
+    """Return the coefficients that predict one step best."""
+    rows = np.arange(order + delay, record.pressure.size)
+    past = _past(record, order, delay, rows)
+    return np.asarray(np.linalg.lstsq(past, record.pressure[rows], rcond=None)[0])
+
+
+def _past(record: ActuatorRecord, order: int, delay: int, rows: NDArray[np.int64]) -> Array:
     u, p = record.opening - record.opening[0], record.pressure
-    rows = np.arange(order + delay, p.size)
     past = [u[rows - delay - k] for k in range(order)]
     past += [-p[rows - k] for k in range(1, order + 1)]
-    return np.asarray(np.linalg.lstsq(np.stack(past, 1), p[rows], rcond=None)[0])
+    return np.stack(past, 1)
+
+
+def _ahead(record: ActuatorRecord, order: int, delay: int, coefficients: Array) -> Array:
+    rows = np.arange(order + delay, record.pressure.size)
+    error = np.zeros(record.pressure.size)
+    error[rows] = _past(record, order, delay, rows) @ coefficients - record.pressure[rows]
+    return error

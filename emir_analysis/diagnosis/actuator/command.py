@@ -11,9 +11,9 @@ from emir_analysis.diagnosis.actuator.result import (
     judged_runs,
     noise_floor,
     stages,
-    write_json,
 )
 from emir_analysis.diagnosis.actuator.search import Progress, search
+from emir_analysis.diagnosis.result import write_json
 from emir_analysis.errors import InputError
 from emir_analysis.import_command import write_signals
 from emir_analysis.signals import Array, Source, read_signal_map

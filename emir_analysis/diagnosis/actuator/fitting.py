@@ -54,13 +54,13 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A machine fitted with effects: x (k,) at the optimum, its deviation (k,), free-run error."""
+    """A machine fitted with effects: x (k,) at the optimum, its covariance (k, k), rms error."""
 
     effects: tuple[str, ...]
     unknowns: tuple[Unknown, ...]
     machine: Actuator
     x: Array
-    deviation: Array
+    covariance: Array
     rms: float
 
     @property
@@ -156,7 +156,7 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
         members,
         machine(x),
         x,
-        _deviation(np.asarray(best.jac), np.asarray(best.fun)),
+        _covariance(np.asarray(best.jac), np.asarray(best.fun)),
         math.sqrt(2.0 * float(best.cost) / best.fun.size),
     )
 
@@ -200,16 +200,16 @@ def _is_on(machine: Actuator, effect: str) -> bool:
     return any(getattr(members, size) != 0.0 for size in members.sizes)
 
 
-def _deviation(jacobian: Array, error: Array) -> Array:
-    """Return standard deviations from the curvature; errors in a row count as one.
+def _covariance(jacobian: Array, error: Array) -> Array:
+    """Return the covariance (k, k) from the curvature; errors in a row count as one.
 
     The number of independent errors follows from their correlation (Bartlett 1946).
     """
     centred = error - error.mean()
     size = error.size
     if not np.any(centred):
-        return np.zeros(jacobian.shape[1])
+        return np.zeros((jacobian.shape[1], jacobian.shape[1]))
     correlation = np.correlate(centred, centred, "full")[size - 1 :] / (centred @ centred)
     repeated = float(1.0 + 2.0 * np.sum(correlation[1 : size // 4] ** 2))
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0) * np.mean(error**2) * repeated))
+    return np.asarray(inverse * np.mean(error**2) * repeated)

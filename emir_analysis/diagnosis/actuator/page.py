@@ -1,19 +1,20 @@
 """The report of an actuator's diagnosis as a page, and its pictures."""
 
+import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
-from emir_analysis.diagnosis.actuator.result import ActuatorDiagnosis
+from emir_analysis.diagnosis.actuator.result import LABELS, ActuatorDiagnosis
+from emir_analysis.diagnosis.page import error_tests
 from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
 from emir_analysis.signals import Array
 
 COLOURS = {"nominal": "#b9c2cb", "refitted": "#e8963a", "black_box": "#7a9e3b",
            "with_effect": "#0b6bb5"}  # fmt: skip
-LABELS = {"nominal": "data sheet", "refitted": "re-fitted", "with_effect": "with effects",
-          "black_box": "best linear model"}  # fmt: skip
 MEASURED = "#1d2733"
+SHOWN = 12  # candidates on the page; the JSON has all
 
 
 def write_page(
@@ -30,6 +31,8 @@ def write_page(
         for e in result.effects
         for name, p in e.parameters.items()
     ]
+    closest = sorted(result.candidates, key=lambda c: math.inf if c.unseen is None else c.unseen)
+    closest = closest[:SHOWN]
     blocks: list[Block] = [
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
@@ -57,18 +60,27 @@ def write_page(
         ),
         Heading("What was tried"),
         Table(
-            ("effects", "better by", "error on blocks left out"),
-            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in result.candidates],
-            "Bayesian information criterion over that of parameters only; another 6 are strong.",
+            ("effects", "better by", "error on parts left out"),
+            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in closest],
+            "better by: Bayesian information criterion, over parameters only; 6 are strong. The"
+            f" {len(closest)} closest of {len(result.candidates)} that were tried.",
         ),
         Heading("Parameters"),
         Table(
-            ("parameter", "fitted", "low", "high", "unit"),
+            ("parameter", "fitted", "low", "high", "unit", "confounded with"),
             [
-                (path, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
+                (
+                    path,
+                    p.value,
+                    p.low,
+                    p.high,
+                    p.unit.replace("time", result.time_unit),
+                    ", ".join(p.confounded_with),
+                )
                 for path, p in result.parameters.items()
             ],
         ),
+        *error_tests({PRESSURE: "oil pressure"}, result.signals, result.one_step, result.tests),
     ]
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
 

@@ -1,47 +1,41 @@
 """The result of an actuator's diagnosis, in the form and with the keys of the boom's."""
 
-import json
 import math
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
-from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run
+from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run, one_step_error
 from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
 from emir_analysis.diagnosis.actuator.search import AT_NOISE, Search
-from emir_analysis.errors import InputError
+from emir_analysis.diagnosis.result import (
+    BalanceResult,
+    EffectResult,
+    ErrorTests,
+    ParameterResult,
+    SignalResult,
+    confounded,
+)
+from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 from emir_analysis.signals import Array
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
 BALANCE = "oil"  # the only one that opening and pressure allow
-EXPLAINED = 0.7  # of the error without effects, on blocks left out: half of its square
+EXPLAINED = 0.7  # of the error without effects, on parts left out: half of its square
+BLOCK = 2.0  # slow periods in a block of the bootstrap
 INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
+LABELS = {
+    "nominal": "data sheet",
+    "refitted": "re-fitted",
+    "with_effect": "with the effects",
+    "black_box": "best linear model",
+}
 NOT_TOLD = (
     "without the piston's position and velocity, forces cannot be told from flows by"
     " measurement: effects are told apart by the course of the pressure alone"
 )
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A fitted parameter; low, high: two standard deviations from the curvature of the fit."""
-
-    value: float
-    unit: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class EffectResult:
-    """An effect that the machine has, with its parameters by name."""
-
-    name: str
-    balance: str
-    parameters: dict[str, Parameter]
 
 
 @dataclass(frozen=True)
@@ -54,31 +48,12 @@ class CandidateResult:
 
 
 @dataclass(frozen=True)
-class BalanceResult:
-    """RMS of what is missing over half a slow period; noise: the transducer's share."""
-
-    unit: str
-    noise: float
-    before: float
-    refitted: float
-    after: float
-
-
-@dataclass(frozen=True)
-class SignalResult:
-    """RMS error of the free run over the judge recording."""
-
-    unit: str
-    noise: float
-    nominal: float
-    refitted: float
-    with_effect: float
-    black_box: float
-
-
-@dataclass(frozen=True)
 class ActuatorDiagnosis:
-    """What the model of an actuator lacks. spread: standard deviation of the judged pressure."""
+    """What the model of an actuator lacks.
+
+    signals: over the judge recording; one_step: one sample ahead of the measured pressure.
+    spread: standard deviation of the judged pressure.
+    """
 
     verdict: str
     statement: str
@@ -86,7 +61,9 @@ class ActuatorDiagnosis:
     candidates: tuple[CandidateResult, ...]
     balances: dict[str, BalanceResult]
     signals: dict[str, SignalResult]
-    parameters: dict[str, Parameter]
+    one_step: dict[str, SignalResult]
+    tests: dict[str, ErrorTests]
+    parameters: dict[str, ParameterResult]
     spread: float
     not_told: str
     time_unit: str
@@ -117,13 +94,35 @@ def judged_runs(
     A judge recording that goes on where the other ended is simulated from that one's start, by
     the valve opening alone. judge: None for the recording itself.
     """
-    judged, skipped = record, 0
-    if judge is not None and judge.follows(record):
-        judged, skipped = judge.behind(record), record.opening.size
-    elif judge is not None:
-        judged = judge
+    judged, skipped = _whole(record, judge)
     runs = {name: free_run(machine, judged)[skipped:] for name, machine in machines.items()}
     return runs | {"black_box": linear_run(linear_model(record), judged.opening)[skipped:]}
+
+
+def one_step_errors(
+    machines: dict[str, Actuator], record: ActuatorRecord, judge: ActuatorRecord | None
+) -> dict[str, Array]:
+    """Return each machine's errors one sample ahead, and the linear model's.
+
+    The measured pressure goes into every term up to the sample before.
+    """
+    judged, skipped = _whole(record, judge)
+    steps = {
+        name: np.diff(driven(machine, judged.opening, judged.pressure, judged.period))
+        - np.diff(judged.pressure)
+        for name, machine in machines.items()
+    }
+    steps["black_box"] = one_step_error(record, judged)[1:]
+    return {name: error[skipped:] for name, error in steps.items()}
+
+
+def _whole(record: ActuatorRecord, judge: ActuatorRecord | None) -> tuple[ActuatorRecord, int]:
+    """Return what is simulated to judge, and how many samples of it are not judged."""
+    if judge is None:
+        return record, 0
+    if judge.follows(record):
+        return judge.behind(record), record.opening.size
+    return judge, 0
 
 
 def diagnosis(
@@ -136,7 +135,9 @@ def diagnosis(
     """Put the findings into numbers; runs: as `judged_runs` returns them."""
     noise = noise_floor(sheet, record)
     judged = record if judge is None else judge
-    errors = {name: _rms(run - judged.pressure) for name, run in runs.items()}
+    errors = {name: run - judged.pressure for name, run in runs.items()}
+    ahead = one_step_errors(stages(sheet, found), record, judge)
+    slow = _slow_period(found)
     chosen = found.chosen.fitted
     fitted = _parameters(chosen)
     verdict = _verdict(found, noise)
@@ -155,7 +156,9 @@ def diagnosis(
             for t in found.tried[1:]
         ),
         balances={BALANCE: _balance(sheet, found, record, noise)},
-        signals={PRESSURE: SignalResult(record.unit, noise, **errors)},
+        signals={PRESSURE: _signal(record.unit, noise, errors)},
+        one_step={PRESSURE: _signal(record.unit, math.sqrt(2.0) * noise, ahead)},
+        tests={PRESSURE: _tests(errors, ahead, judged, slow)},
         parameters={path: p for path, p in fitted.items() if path in sheet.ranges},
         spread=float(np.std(judged.pressure)),
         not_told=NOT_TOLD,
@@ -164,14 +167,6 @@ def diagnosis(
         judged_on=judged.name,
         judged_from_its_own_start=judge is None or not judge.follows(record),
     )
-
-
-def write_json(path: Path, result: ActuatorDiagnosis) -> None:
-    """Write the result as JSON. Raises InputError when the file cannot be written."""
-    try:
-        path.write_text(json.dumps(asdict(result), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
 
 
 def summary(result: ActuatorDiagnosis) -> str:
@@ -183,15 +178,17 @@ def summary(result: ActuatorDiagnosis) -> str:
         for name, p in effect.parameters.items():
             about = f"{p.value:10.4g}  ({p.low:.3g} ... {p.high:.3g}) {_unit(p.unit, result)}"
             lines.append(f"{effect.name + '.' + name:36}{about}")
-    figures = (
-        f"  data sheet {s.nominal:.3f}, re-fitted {s.refitted:.3f}, with the effects"
-        f" {s.with_effect:.3f}, best linear model {s.black_box:.3f}"
-    )
+    i, ahead = result.tests[PRESSURE].intervals, result.one_step[PRESSURE]
+    figures = "  " + ", ".join(f"{label} {getattr(s, n):.3f}" for n, label in LABELS.items())
     lines += [
         "",
         f"free run of {PRESSURE} on {result.judged_on}, from {start}, by the valve opening alone",
         f"RMS error in units of the file (its spread {result.spread:.3g}, noise {s.noise:.2g}):",
         figures,
+        "  95 % by block bootstrap: "
+        + ", ".join(f"{label} {i[n].low:.3f} ... {i[n].high:.3f}" for n, label in LABELS.items()),
+        "one sample ahead of the measured pressure:",
+        "  " + ", ".join(f"{label} {getattr(ahead, n):.3f}" for n, label in LABELS.items()),
     ]
     return "\n".join(lines)
 
@@ -215,7 +212,7 @@ def _statement(verdict: str, found: Search, noise: float) -> str:
     if verdict == "nothing_missing":
         return "parameters inside their ranges bring the free run to the noise"
     left = (
-        f"{chosen.unseen:.3g} is left of {plain.unseen:.3g} on blocks left out of the fit,"
+        f"{chosen.unseen:.3g} is left of {plain.unseen:.3g} on parts left out of the fit,"
         f" {chosen.unseen / noise:.0f} times the noise"
     )
     if verdict == "unexplained":
@@ -234,16 +231,38 @@ def _instead(rival: Fitted, chosen: Fitted) -> str:
     return f"{' and '.join(added)} in place of {' and '.join(missing)}"
 
 
-def _parameters(fitted: Fitted) -> dict[str, Parameter]:
+def _signal(unit: str, noise: float, errors: dict[str, Array]) -> SignalResult:
+    return SignalResult(unit, noise, **{name: _rms(error) for name, error in errors.items()})
+
+
+def _tests(
+    errors: dict[str, Array], ahead: dict[str, Array], judged: ActuatorRecord, slow: float
+) -> ErrorTests:
+    period, opening = judged.period, judged.opening
+    return ErrorTests(
+        {n: rms_intervals(e[:, None], period, BLOCK * slow)[0] for n, e in errors.items()},
+        {n: input_correlation(e, opening, period, slow) for n, e in errors.items()},
+        {n: whiteness(e, period, slow) for n, e in ahead.items()},
+    )
+
+
+def _slow_period(found: Search) -> float:
+    return 2.0 * math.pi / found.plain.fitted.machine.load.frequency
+
+
+def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:
     found = {}
-    for unknown, x, deviation in zip(fitted.unknowns, fitted.x, fitted.deviation, strict=True):
+    together = confounded([unknown.path for unknown in fitted.unknowns], fitted.covariance)
+    deviations = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
+    for unknown, x, deviation in zip(fitted.unknowns, fitted.x, deviations, strict=True):
         ends = [min(max(x + s * INTERVAL * deviation, unknown.low), unknown.high) for s in (-1, 1)]
         low, high = sorted(unknown.value(float(end)) for end in ends)
-        found[unknown.path] = Parameter(unknown.value(float(x)), unknown.unit, low, high)
+        value, with_it = unknown.value(float(x)), together[unknown.path]
+        found[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
     return found
 
 
-def _effect(name: str, fitted: dict[str, Parameter]) -> EffectResult:
+def _effect(name: str, fitted: dict[str, ParameterResult]) -> EffectResult:
     start = f"effects.{name}."
     own = {path.removeprefix(start): p for path, p in fitted.items() if path.startswith(start)}
     return EffectResult(name, REGISTRY[name].balance, own)
@@ -252,8 +271,7 @@ def _effect(name: str, fitted: dict[str, Parameter]) -> EffectResult:
 def _balance(
     sheet: ActuatorSheet, found: Search, record: ActuatorRecord, noise: float
 ) -> BalanceResult:
-    slow = math.pi / found.plain.fitted.machine.load.frequency / record.period
-    window = max(1, round(slow))
+    window = max(1, round(0.5 * _slow_period(found) / record.period))
 
     def missing(machine: Actuator) -> float:
         modelled = driven(machine, record.opening, record.pressure, record.period)

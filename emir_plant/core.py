@@ -310,16 +310,22 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
 
 
 @compiled_parallel
-def simulate_each(
-    starts: Array, commands: Array, dt: float, every: int, parameters: NDArray[Any]
+def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
+    starts: Array,
+    commands: Array,
+    dt: float,
+    every: int,
+    parameters: NDArray[Any],
+    step: float = STEP,
 ) -> Array:
     """Run m machines under the same commands, one by one on each core.
 
-    starts: (m, n) states; parameters: (m,) records. Returns (m, 1 + k // every, len(Truth)).
+    starts: (m, n) states; parameters: (m,) records; step: as for `advance`. Returns
+    (m, 1 + k // every, len(Truth)).
     """
     machines = parameters.size
     columns = len(truth(starts[0], parameters[:1]))
     result = np.empty((machines, 1 + commands.size // every, columns))
     for m in numba.prange(machines):
-        result[m] = simulate(starts[m], commands, dt, every, parameters[m : m + 1])
+        result[m] = simulate(starts[m], commands, dt, every, parameters[m : m + 1], step)
     return result

@@ -24,17 +24,23 @@ COLUMNS = len(Truth._fields)
 STAGES = ("k1", "k2", "k3", "k4", "between")
 
 
-def simulate_many(
-    starts: Array, commands: Array, dt: float, every: int, parameters: NDArray[Any]
+def simulate_many(  # noqa: PLR0913, PLR0917 (as core.simulate)
+    starts: Array,
+    commands: Array,
+    dt: float,
+    every: int,
+    parameters: NDArray[Any],
+    step: float = STEP,
 ) -> Array:
     """Run m machines under the same commands, on all cores.
 
-    starts: (m, n) states; commands: (k,), each held for dt, s; parameters: (m,) records.
-    Returns (m, 1 + k // every, len(Truth)) as `core.simulate` gives it for each, bit by bit.
+    starts: (m, n) states; commands: (k,), each held for dt, s; parameters: (m,) records;
+    step: s, the longest of the integration. Returns (m, 1 + k // every, len(Truth)) as
+    `core.simulate` gives it for each, bit by bit.
     """
     if len(starts) < LANES or any(parameters[name].any() for name in EFFECT_SIZES):
-        return core.simulate_each(starts, commands, dt, every, parameters)
-    found = _simulate(_side_by_side(starts, parameters), commands, dt, every)
+        return core.simulate_each(starts, commands, dt, every, parameters, step)
+    found = _simulate(_side_by_side(starts, parameters), commands, dt, every, step)
     return found[: len(starts)]
 
 
@@ -90,9 +96,9 @@ def _step(m: Any, command: float, h: float) -> None:
 
 
 @compiled_parallel
-def _simulate(machines: NDArray[Any], commands: Array, dt: float, every: int) -> Array:
+def _simulate(machines: NDArray[Any], commands: Array, dt: float, every: int, step: float) -> Array:
     """Return (groups * LANES, 1 + k // every, COLUMNS)."""
-    steps = max(1, math.ceil(dt / STEP - 1e-9))
+    steps = max(1, math.ceil(dt / step - 1e-9))
     result = np.empty((machines.size * LANES, 1 + commands.size // every, COLUMNS))
     for group in numba.prange(machines.size):
         m = machines[group]

@@ -25,11 +25,13 @@ from emir_analysis.diagnosis.experiment import (
     COMMAND_STEP,
     OUTPUTS,
     STROKE,
+    SUBSTEP,
     Experiment,
 )
 from emir_analysis.diagnosis.free_run import ANGLE as ANGLE_COLUMN
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.measured_state import Modelled, follow
+from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
 from emir_plant.parameters import Machine
@@ -63,7 +65,6 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
-SUBSTEP = 2e-3  # s, of the states that no sensor shows: a tenth of the spool's period and less
 
 
 class Balances:
@@ -189,11 +190,7 @@ class Balances:
         if not starts:
             return []
         able = list(starts)
-        stride = max(
-            n
-            for n in range(1, experiment.every + 1)
-            if experiment.every % n == 0 and n * COMMAND_STEP <= SUBSTEP
-        )
+        stride = experiment.stride(SUBSTEP)
         followed = follow(
             np.array(list(starts.values())),
             experiment.commands[::stride],
@@ -275,9 +272,18 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
     """Return the residuals, (w, 5), that the sensors alone leave in each balance.
 
     Found by simulating the machine under the recorded command, reading it through the sensors'
-    noise and quantisation, and computing its balances with its own parameters.
+    noise and quantisation, and computing its balances with its own parameters. Raises InputError
+    where the machine cannot rest as the recording starts.
     """
-    ideal = free_runs([machine], experiment, [experiment.start()])[0]
+    angle, pressure = experiment.start()
+    start = (angle, machine.supply.pT if np.isnan(pressure) else pressure)
+    ideal = free_runs([machine], experiment, [start])[0]
+    if not np.all(np.isfinite(ideal)):
+        raise InputError(
+            f"{experiment.name}: the data sheet's machine cannot rest at"
+            f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound;"
+            " check the data sheet"
+        )
     left: Array = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
     return left
 

@@ -4,8 +4,11 @@ Every trial is fitted twice: on the balances, which is quick and finds its way f
 and from there on the free run.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -15,7 +18,9 @@ from emir_analysis.diagnosis.fit import Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
+from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
@@ -23,7 +28,10 @@ ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the erro
 ROUGH = 3e-2  # the same where only the way to the optimum is wanted
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
-FIRST = 0.25  # share of a recording on which a fit of the free run sets out
+GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted before the whole
+SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
+MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
+SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 SETTLING = 5.0  # s from the start in which the state at rest is found
 
 
@@ -87,54 +95,102 @@ def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
 def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the free run of recordings.
 
-    First to their beginning: over a short run parameters that are still off drift less, and it
-    costs less. A trial that cannot follow even that far is not polished. The state at rest at
-    each recording's start (see `Starts`) is fitted along and then forgotten: it belongs to the
-    recording, not to the machine.
+    First to their beginning, then further: over a short run parameters that are still off drift
+    less, a piston that sticks at another instant does not decide, and it costs less. What shapes
+    an effect near standstill, between two windows of the balances, they tell badly: the best of a
+    few such shapes is where the fit begins. A trial that cannot follow the beginning is not
+    polished. The state at rest at each recording's start (see `Starts`) is fitted along and then
+    forgotten: it belongs to the recording, not to the machine.
     """
-    x = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
-    begun = _fit_free_run(start, evidence, FIRST, x, ROUGH)
+    x = np.append(_shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
+    begins = [x]
+    for share in GROWING:
+        begun = fit(_free_run_problem(start, evidence, share, begins[-1]), ROUGH)
+        begins.append(begun.x)
     accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
-    return start.continued(_fit_free_run(start, evidence, 1.0, begun.x, accuracy))
+    # what acts late is not told by the beginning, and may have been led astray there
+    whole = _free_run_problem(start, evidence, 1.0, x)
+    cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)
+    best = begins[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))]
+    return start.continued(fit(replace(whole, start=best), accuracy))
+
+
+def _shaped(start: Trial, evidence: Evidence) -> Trial:
+    """Return the trial with those shapes of its effects whose free run is best."""
+    for effect in start.effects:
+        points = _shapes(start, effect)
+        errors = coarse_errors([start.unknowns.at(x) for x in points], evidence)
+        cost = np.mean(np.square(errors), axis=1)
+        start = start.at(points[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))])
+    return start
+
+
+def _shapes(start: Trial, effect: str) -> Array:
+    """Return vectors, (m, k), that differ in those fields of an effect that are no sizes.
+
+    The trial's own is the first; of more than MOST_SHAPING such fields it is the only one.
+    """
+    members, sizes = start.unknowns.members, REGISTRY[effect].sizes
+    shaping = [
+        k
+        for k, u in enumerate(members)
+        if u.path.startswith(f"effects.{effect}.") and u.path.rsplit(".", 1)[1] not in sizes
+    ]
+    if len(shaping) > MOST_SHAPING:
+        return start.x[None]
+    levels = []
+    for k in shaping:
+        x, u = float(start.x[k]), members[k]
+        others = [x - SHAPE_STEP, x + SHAPE_STEP] if u.logarithmic else []
+        levels.append([x, u.start, *(float(np.clip(v, u.low, u.high)) for v in others)])
+    points = []
+    for chosen in product(*levels):
+        point = start.x.copy()
+        point[shaping] = chosen
+        points.append(point)
+    return np.array(points)
 
 
 def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole."""
     x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
-    return known.continued(_fit_free_run(known, evidence, 1.0, x, ACCURACY))
+    return known.continued(fit(_free_run_problem(known, evidence, 1.0, x), ACCURACY))
 
 
-def _fit_free_run(
-    start: Trial, evidence: Evidence, share: float, x: Array, accuracy: float
-) -> Solution:
+def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) -> Problem:
+    """Return the free run of the first part of recordings as a problem.
+
+    x: start, (k + 2 r,), the trial's and two numbers for the state at rest in each recording.
+    """
     own, states = start.x.size, x.size - start.x.size
     experiments = [e.head(share) for e in evidence.experiments]
     starts = [Starts(e, evidence) for e in experiments]
 
-    def model(points: Array) -> Array:
+    def model(points: Array, *, coarse: bool = False) -> Array:
         machines = [start.unknowns.at(x[:own]) for x in points]
         parts = []
         for k, (experiment, begin) in enumerate(zip(experiments, starts, strict=True)):
-            at = points[:, own + 2 * k : own + 2 * k + 2]
-            parts.append(_free_run_errors(machines, experiment, evidence, begin.at(at)))
+            at = begin.at(points[:, own + 2 * k : own + 2 * k + 2])
+            parts.append(_free_run_errors(machines, experiment, evidence, at, coarse=coarse))
         return np.concatenate(parts, axis=1)
 
     low, high = start.unknowns.bounds
-    problem = Problem(
+    return Problem(
         model,
         x,
         np.append(low, -np.ones(states)),
         np.append(high, np.ones(states)),
         np.append(start.unknowns.toleranced, np.zeros(states, dtype=bool)),
+        partial(model, coarse=True),
+        SLOPE_STEP,
     )
-    return fit(problem, accuracy)
 
 
 class Starts:
     """States of rest at the start of a recording that the sensors leave open.
 
     Two numbers from -1 to 1: the angle within the resolver's step and p_S within its noise, or
-    within what the pump gives where no sensor shows it.
+    within what lets the boom rest where no sensor shows it.
     """
 
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
@@ -143,14 +199,31 @@ class Starts:
         half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
         half_range = sensors.pressure_noise
         if np.isnan(pressure):
-            supply = evidence.stated.supply
-            pressure, half_range = 0.5 * (supply.pT + supply.p0), 0.5 * (supply.p0 - supply.pT)
+            low, high = _resting_pressures(evidence.stated, angle)
+            pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)
         self._middle = np.array([angle, pressure])
         self._half = np.array([half_step, half_range])
 
     def at(self, points: Array) -> list[tuple[float, float]]:
         """Return angle, rad, and p_S, Pa, for (m, 2) numbers."""
         return [(float(a), float(p)) for a, p in self._middle + self._half * points]
+
+
+def _resting_pressures(machine: Machine, angle: float) -> tuple[float, float]:
+    """Return between which p_S, Pa, a machine can rest at an angle, rad: half the pump's or less.
+
+    More is not left in a lowering chamber that was shut at standstill.
+    """
+    low, high = machine.supply.pT, 0.5 * machine.supply.p0
+    plant = Plant(machine)
+    for _ in range(5):
+        try:
+            plant.initial(angle, high)
+        except SimulationError:
+            high = 0.5 * (low + high)
+        else:
+            return low, high
+    return low, low
 
 
 def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
@@ -166,6 +239,16 @@ def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
         error = (free_run(machine, experiment, evidence) - experiment.outputs) / evidence.sensors
         found.append(error[:, evidence.shown])
     return found
+
+
+def coarse_errors(machines: Sequence[Machine], evidence: Evidence) -> Array:
+    """Return errors in units of the noise, (m, n), of coarse free runs of all recordings."""
+    middle = np.zeros((len(machines), 2))
+    errors = [
+        _free_run_errors(machines, e, evidence, Starts(e, evidence).at(middle), coarse=True)
+        for e in evidence.experiments
+    ]
+    return np.concatenate(errors, axis=1)
 
 
 def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tuple[float, float]:
@@ -192,8 +275,10 @@ def _free_run_errors(
     experiment: Experiment,
     evidence: Evidence,
     starts: Sequence[tuple[float, float]],
+    *,
+    coarse: bool = False,
 ) -> Array:
     """Return errors in units of the noise, one row for each machine."""
-    runs = free_runs(machines, experiment, starts)[:, :, ANGLE + 1 :]
+    runs = free_runs(machines, experiment, starts, coarse=coarse)[:, :, ANGLE + 1 :]
     error = (runs - experiment.outputs)[:, :, evidence.shown] / evidence.sensors[evidence.shown]
     return np.asarray(error.reshape(len(machines), -1))

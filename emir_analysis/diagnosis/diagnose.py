@@ -17,7 +17,7 @@ from emir_analysis.diagnosis.candidates import (
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import rms
-from emir_analysis.diagnosis.screening import screen
+from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
 from emir_analysis.diagnosis.select import (
     SEEN,
     SPEAKS,
@@ -140,40 +140,87 @@ class _Search:
             return [self.refitted]  # nothing is left that an effect could explain
         plain = fit_balances(self.balanced, self._head, self.floor)
         best = self._scored(plain, free_run_score(self.refitted, self._evidence))
-        self.tried, equal = [best], [best.trial]
+        self.tried, equal, enough = [best], [best.trial], False
         while len(best.trial.effects) < MOST_EFFECTS:
-            simulated = self._round(best)
-            better = [t for t in simulated if _free(t) < _free(best) - STRONG]
+            self._progress(f"all effects beside: {best.trial.name}")
+            better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
             best = min(better, key=_free)
-            floor = self._evidence.floor(best.trial.machine)
-            if quiet(self._left(best.trial), floor) and explained(
-                free_run_errors(best.trial.machine, self._evidence)
-            ):
+            enough = self._enough(best.trial)
+            if enough and self._excess(best.trial) <= AT_NOISE**2 - 1.0:
                 break
+        if not enough and np.any(self._evidence.fitted):
+            self._progress("pairs of effects")
+            found = screen_pairs(plain, self._sheet, self._head, self.floor)
+            better = self._better(self._on_balances(found, best), best)
+            if better:
+                equal = rivals([t.trial for t in better], [_free(t) for t in better])
         return equal
 
-    def _round(self, best: Tried) -> list[Tried]:
-        """Try one effect more beside the best trial; return those that went on to the free run."""
-        self._progress(f"all effects beside: {best.trial.name}")
-        found = screen(best.trial, self._sheet, self._head, self.floor)
+    def _beside(self, best: Tried) -> list[Tried]:
+        """Return what is better with one effect more.
+
+        Where missing sensors leave balances out, what those would show is in the free run alone.
+        """
+        if np.any(self._evidence.fitted):
+            found = screen(best.trial, self._sheet, self._head, self.floor)
+            better = self._better(self._on_balances(found, best), best)
+            if better or np.all(self._evidence.told):
+                return better
+        return self._better(self._on_free_run(best), best)
+
+    def _beside_enough(self, best: Tried) -> list[Tried]:
+        """Return the same beside a trial that is good enough: what takes away most of the rest.
+
+        The balances are quiet then; the free run alone may know more.
+        """
+        least = 0.5 * self._excess(best.trial)
+        better = self._better(self._on_free_run(best), best)
+        return [t for t in better if self._excess(t.trial) < least]
+
+    def _on_free_run(self, best: Tried) -> list[Tried]:
+        """Return the trials with one effect more that promise most on the free run."""
+        found = screen_free_run(best.trial, self._sheet, self._head)
+        return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
+
+    def _on_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
+        """Fit trials to the balances; return those that come close to the best of them."""
+        known = {frozenset(tried.trial.effects) for tried in self.tried}
+        new = [s.trial for s in found if frozenset(s.trial.effects) not in known]
         round_ = []
-        for screened in found[:MOST_FITTED]:
-            self._progress(f"balances: {screened.trial.name}")
-            round_.append(self._scored(fit_balances(screened.trial, self._head, self.floor)))
+        for trial_ in new[:MOST_FITTED]:
+            self._progress(f"balances: {trial_.name}")
+            round_.append(self._scored(fit_balances(trial_, self._head, self.floor)))
         least = min((t.balances for t in round_), default=np.inf)
         limit = min(best.balances - STRONG, least + CLOSE)
         close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
         promising = close[:MOST_SIMULATED]
+        self.tried += [t for t in round_ if t not in promising]
+        return promising
+
+    def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
+        """Fit trials to the free run; return those that are better than the best so far."""
         simulated = []
         for tried in promising:
             self._progress(f"free run: {tried.trial.name}")
             fitted = fit_free_run(tried.trial, self._head)
             simulated.append(Tried(fitted, tried.balances, free_run_score(fitted, self._evidence)))
-        self.tried += simulated + [t for t in round_ if t not in promising]
-        return simulated
+        self.tried += simulated
+        return [t for t in simulated if _free(t) < _free(best) - STRONG]
+
+    def _enough(self, tried: Trial) -> bool:
+        """Tell whether a trial leaves no balance speaking and explains the free run."""
+        floor = self._evidence.floor(tried.machine)
+        return quiet(self._left(tried), floor) and explained(
+            free_run_errors(tried.machine, self._evidence)
+        )
+
+    def _excess(self, tried: Trial) -> float:
+        """Return the largest mean square of a free-run error beyond the noise, in its units."""
+        errors = np.concatenate(free_run_errors(tried.machine, self._evidence))
+        return float(np.max(rms(errors)) ** 2 - 1.0)
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)

@@ -25,6 +25,7 @@ OUTPUTS = {  # what a free run is compared with, in this order, and its unit
 SIGNALS = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS
 
 COMMAND_STEP = 1e-3  # s, the grid on which the held command is kept
+SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and less
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
 REST = 0.2  # s at the start from which the initial pressure is averaged
 SHORTEST_REST = 0.1  # s
@@ -57,6 +58,11 @@ class Experiment:
     def every(self) -> int:
         """Steps of the command grid between two samples."""
         return round(self.period / COMMAND_STEP)
+
+    def stride(self, longest: float) -> int:
+        """Return the most steps of the command grid, within `longest`, s, that divide a sample."""
+        fitting = (n for n in range(1, self.every + 1) if self.every % n == 0)
+        return max(n for n in fitting if n == 1 or n * COMMAND_STEP <= longest)
 
     def head(self, share: float) -> "Experiment":
         """Return the first part of the recording."""

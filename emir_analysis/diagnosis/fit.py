@@ -12,6 +12,7 @@ from emir_analysis.signals import Array
 
 STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
+LEAST_STEP = 1e-5  # relative, of the vector: not met because steps that lead nowhere were cut
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
 
@@ -22,6 +23,8 @@ class Problem:
     model: (m, k) vectors -> (m, n) residuals in units of the noise. start, low, high: (k,).
     stated: (k,) true for parameters that a maker states: they are held to their stated value as
     weakly as their tolerance says, so that what the data cannot tell stays where it is.
+    coarse: a cheaper model with the same slopes, from which the Jacobian is taken. step: of its
+    finite differences.
     """
 
     model: Callable[[Array], Array]
@@ -29,6 +32,8 @@ class Problem:
     low: Array
     high: Array
     stated: NDArray[np.bool_]
+    coarse: Callable[[Array], Array] | None = None
+    step: float = STEP
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Solution:
 def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     """Minimise the squared residuals of a problem inside its bounds.
 
-    accuracy: relative, of cost and vector. robust: residuals far above the noise count by their
+    accuracy: relative, of the cost. robust: residuals far above the noise count by their
     size, not by its square.
     """
     held = np.flatnonzero(problem.stated)
@@ -53,21 +58,21 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         return np.concatenate([problem.model(x[None])[0], x[held] / TOLERANCE_SPREAD])
 
     def jacobian(x: Array) -> Array:
-        steps = np.where(x + STEP > high, -STEP, STEP)
-        values = problem.model(np.vstack([x, x + np.diag(steps)]))
+        steps = np.where(x + problem.step > high, -problem.step, problem.step)
+        values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
         slopes = (values[1:] - values[0]) / steps[:, None]
         prior = np.eye(x.size)[held] / TOLERANCE_SPREAD
         # a neighbour that cannot be simulated says nothing about the slope
         return np.vstack([np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0), prior])
 
-    margin = 1e-6 * (high - low)
+    margin = 1e-6 * np.minimum(high - low, 1.0)
     result = least_squares(
         residuals,
         np.clip(problem.start, low + margin, high - margin),
         jac=jacobian,
         bounds=(low, high),
         loss="soft_l1" if robust else "linear",
-        xtol=accuracy,
+        xtol=LEAST_STEP,
         ftol=accuracy,
         max_nfev=EVALUATIONS,
     )

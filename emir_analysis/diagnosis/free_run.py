@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, SUBSTEP, Experiment
 from emir_analysis.signals import Array
 from emir_plant import lanes
 from emir_plant.parameters import Machine
@@ -16,12 +16,17 @@ ANGLE = 0  # the resolver's; the others are the compared outputs, in the order o
 
 
 def free_runs(
-    machines: Sequence[Machine], experiment: Experiment, starts: Sequence[tuple[float, float]]
+    machines: Sequence[Machine],
+    experiment: Experiment,
+    starts: Sequence[tuple[float, float]],
+    *,
+    coarse: bool = False,
 ) -> Array:
     """Return what the sensors show, (m, n, 5) in the order of SHOWN, without noise.
 
     The machines start at rest at the sensors' (angle, rad, and p_S, Pa); p_H follows from the
     balance of forces, the logic block is settled. A machine that cannot rest there gives NaN.
+    coarse: in twice the integration step, for half the time; good for comparing such runs.
     """
     plants = [Plant(machine) for machine in machines]
     states = [_at_rest(plant, *start) for plant, start in zip(plants, starts, strict=True)]
@@ -29,12 +34,14 @@ def free_runs(
     result = np.full((len(plants), experiment.angle.size, len(SHOWN)), np.nan)
     if not able:
         return result
+    stride = experiment.stride(SUBSTEP) if coarse else 1
     truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
-        experiment.commands,
-        COMMAND_STEP,
-        experiment.every,
+        experiment.commands[::stride],
+        COMMAND_STEP * stride,
+        experiment.every // stride,
         np.concatenate([plants[k].record for k in able]),
+        COMMAND_STEP * stride,
     )
     for k, truth in zip(able, truths, strict=True):
         shown = readings(plants[k], truth, experiment.period)

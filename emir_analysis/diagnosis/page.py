@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.judged import Judged
@@ -87,8 +89,9 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
             columns,
             rows,
             "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
-            "of the sensor noise. Up to 1.1 is at the noise, up to 2 explained. The black box is a "
-            "linear model of measured signals, trained on the same recordings.",
+            "of the sensor noise (which is given in the signal's unit). Up to 1.1 is at the noise, "
+            "up to 2 explained. The black box is a linear model of measured signals, trained on "
+            "the same recordings.",
         ),
         Picture(
             free_runs_picture(findings, judged),
@@ -99,16 +102,21 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
 
 
 def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
+    if not np.any(findings.evidence.fitted):
+        return []
     blocks: list[Block] = [
         Heading("What each balance lacks"),
         Table(
-            ("balance", "noise", "data sheet", "re-fitted", "after", "unit"),
+            ("balance", "noise", "data sheet", "re-fitted", "with effect"),
             [
-                (name, b.noise, b.before, b.refitted, b.after, b.unit)
-                for name, b in result.balances.items()
+                (label, *(factor * f for f in (b.noise, b.before, b.refitted, b.after)))
+                for label, factor, b in (
+                    (*SHOWN[name], b) for name, b in result.balances.items() if name in SHOWN
+                )
             ],
             f"RMS over windows of half a second to a second of {Path(result.recording).name}; "
-            "noise is what the sensors alone would leave.",
+            "noise is what the sensors alone would leave. H is the lifting chamber, S the "
+            "lowering one.",
         ),
         Picture(
             balances_picture(findings),
@@ -158,23 +166,22 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
         about = stated[path]
         return (
             path,
-            about.origin,
-            p.value,
-            p.low,
-            p.high,
-            *about.deviation(0.0, 1.0),
             p.unit,
+            about.origin,
+            "{:.3g} ... {:.3g}".format(*about.deviation(0.0, 1.0)),
+            p.value,
+            f"{p.low:.3g} ... {p.high:.3g}",
             ", ".join(other.rsplit(".", 1)[1] for other in p.confounded_with),
         )
 
     return [
         Heading("Parameters"),
         Table(
-            ("parameter", "stated", "fitted", "low", "high", "least", "most", "unit", "with"),
+            ("parameter", "unit", "stated", "tolerance", "fitted", "interval", "confounded with"),
             [row(path, p) for path, p in result.parameters.items()],
-            "low, high: two standard deviations from the curvature of the fit, the tolerance "
-            "counted as knowledge; least, most: the maker's tolerance; with: what it is confounded "
-            "with. What the recording cannot tell stays near its stated value.",
+            "interval: two standard deviations either way from the curvature of the fit, the "
+            "tolerance counted as knowledge. What the recording cannot tell stays near its stated "
+            "value.",
         ),
     ]
 

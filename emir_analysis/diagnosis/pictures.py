@@ -18,6 +18,7 @@ SHOWN = {
     "pressure_lifting": ("p_H, bar", 1e-5),
     "pressure_lowering": ("p_S, bar", 1e-5),
     "tip_deflection_angle": ("tip deflection, mrad", 1e3),
+    "linkage": ("linkage, mm", 1e3),
     "force": ("force, kN", 1e-3),
     "lifting_chamber": ("flow H, l/min", 6e4),
     "lowering_chamber": ("flow S, l/min", 6e4),

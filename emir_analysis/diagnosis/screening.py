@@ -5,23 +5,30 @@ found once, they are eliminated (variable projection, Golub and Pereyra 1973), a
 only its own few fields remain to be fitted: cheap enough for every effect of the registry.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
-from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
 STARTS = (1.0, -1.0, 4.0, -4.0)  # times the trial sizes, from the best of which a fit starts
-MOST_FITTED = 8  # effects whose own fields are fitted
-HARMONICS = 3  # frequencies from which the fit of a load over time starts
+SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
+MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
+FASTEST_SWING = 0.5  # Hz: faster ones average out over the windows of the force balance
+FREQUENCIES = 4  # of a swinging load that are tried in a bandwidth of 1 / duration
+FEWEST = 8  # windows over which a load has to swing
+
+Missing = Callable[[list[Trial]], Array]
 
 
 @dataclass(frozen=True)
@@ -32,44 +39,28 @@ class Screened:
     cost: float
 
 
-def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
-    """Return the known trial with each further effect of the registry, the best first.
-
-    An effect that cannot be simulated, or that does not stay on, is not in the list.
-    """
-    left = _Left(known, evidence, floor)
-    others = [name for name in REGISTRY if name not in known.effects]
-    begun = [
-        _Candidate(trial(sheet, (*known.effects, name), known), left, evidence) for name in others
-    ]
-    promising = sorted(begun, key=lambda c: c.expected)[:MOST_FITTED]
-    return sorted((c.fitted() for c in promising), key=lambda s: s.cost)
-
-
 class _Left:
-    """What a trial and an effect leave in the balances when parameters do their best."""
+    """What a trial and an effect leave when parameters do their best, in units of the noise.
 
-    def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
-        self._known, self._evidence, self._floor = known, evidence, floor
+    missing: trials -> (m, n), what they leave with their own parameters. step: of its slopes.
+    """
+
+    def __init__(self, known: Trial, missing: Missing, step: float) -> None:
+        self.step_size = step
+        self._missing = missing
         held = known.unknowns.toleranced
         prior = np.diag(np.where(held, 1.0, 0.0)) / TOLERANCE_SPREAD
         self._drawn = np.where(held, known.x, 0.0) / TOLERANCE_SPREAD
         _, high = known.unknowns.bounds
-        steps = np.where(known.x + STEP > high, -STEP, STEP)
-        values = self._missing([known, *(known.at(x) for x in known.x + np.diag(steps))])
+        steps = np.where(known.x + step > high, -step, step)
+        values = missing([known, *(known.at(x) for x in known.x + np.diag(steps))])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
-        jacobian = np.vstack([slopes.T, prior])
-        self._basis, self._triangle = np.linalg.qr(jacobian)
+        self._basis, self._triangle = np.linalg.qr(np.vstack([slopes.T, prior]))
 
     def __call__(self, trials: list[Trial]) -> Array:
-        """Return what is left, (m, n), in units of the floor, for trials with the known x."""
-        return self._projected(self._augmented(trials))
-
-    def force(self) -> Array:
-        """Return the force that the known trial misses in the first recording, (w,) N."""
-        missing: Array = self._evidence.residuals([self._known.machine])[0]
-        force: Array = missing[: self._evidence.windows_of_first, 0]
-        return force
+        """Return what is left, (m, n), for trials with the known x."""
+        residual = self._augmented(trials)
+        return np.asarray(residual - (residual @ self._basis) @ self._basis.T)
 
     def step(self, final: Trial) -> Array:
         """Return the known parameters' best change, (k,), beside an effect."""
@@ -78,103 +69,218 @@ class _Left:
         return np.asarray(-step)
 
     def _augmented(self, trials: list[Trial]) -> Array:
-        missing = self._missing(trials)
-        return np.column_stack([missing, np.tile(self._drawn, (len(trials), 1))])
-
-    def _projected(self, residual: Array) -> Array:
-        return np.asarray(residual - (residual @ self._basis) @ self._basis.T)
-
-    def _missing(self, trials: list[Trial]) -> Array:
-        missing = self._evidence.residuals([t.machine for t in trials]) / self._floor
-        return np.asarray(missing[:, :, self._evidence.fitted].reshape(len(trials), -1))
+        drawn = np.tile(self._drawn, (len(trials), 1))
+        return np.column_stack([self._missing(trials), drawn])
 
 
 class _Candidate:
-    """One effect more, begun at the best of its starts.
+    """Effects more, begun at the best of their starts; the known parameters stay in `start`.
 
-    expected: cost, to first order, when its fields do their best from there.
+    effect: the last of them. x: (k,) their fields, bounds: of x. at_best, slopes: what is left
+    there, (n,), and its slopes, (k, n). expected: cost, to first order, when they do their best.
     """
 
-    def __init__(self, start: Trial, left: _Left, evidence: Evidence) -> None:
-        self._start, self._left = start, left
-        effect = start.effects[-1]
-        self._base = start.x.size - len(quantities(REGISTRY[effect]))
-        members = start.unknowns.members[self._base :]
-        self._low, self._high = (bound[self._base :] for bound in start.unknowns.bounds)
-        starts = _starts(effect, members, left, evidence)
-        points = np.clip(starts, self._low, self._high)
+    def __init__(self, start: Trial, known: int, starts: list[Array], left: _Left) -> None:
+        self._start, self._known, self._left = start, known, left
+        self.effect = start.effects[-1]
+        low, high = (bound[known:] for bound in start.unknowns.bounds)
+        points = np.clip(starts, low, high)
         residuals = self._model(points)
         best = int(np.argmin([_soft(row) for row in residuals]))
-        self._x, at_best = points[best], residuals[best]
-        steps = np.where(self._x + STEP > self._high, -STEP, STEP)
-        slopes = (self._model(self._x + np.diag(steps)) - at_best) / steps[:, None]
-        if np.all(np.isfinite(slopes)):
-            change = np.linalg.lstsq(slopes.T, -at_best, rcond=1e-9)[0]
-            reached = np.clip(self._x + change, self._low, self._high) - self._x
-            self.expected = min(_soft(at_best), _soft(at_best + reached @ slopes))
-        else:
-            self.expected = _soft(at_best)
+        self.bounds, self.x, self.at_best = (low, high), points[best], residuals[best]
+        steps = np.where(self.x + left.step_size > high, -left.step_size, left.step_size)
+        self.slopes = (self._model(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
+        change, self.expected = _least(self.at_best, self.slopes, low - self.x, high - self.x)
+        self._reached = self.x + change
 
     def fitted(self) -> Screened:
-        """Fit the effect's fields."""
-        nothing_held = np.zeros(self._x.size, dtype=bool)
-        problem = Problem(self._model, self._x, self._low, self._high, nothing_held)
-        own = fit(problem, ACCURACY, robust=True).x if np.isfinite(self.expected) else self._x
-        final = self._start.at(np.append(self._start.x[: self._base], own))
-        low, high = (bound[: self._base] for bound in self._start.unknowns.bounds)
-        moved = np.clip(self._start.x[: self._base] + self._left.step(final), low, high)
-        cost = _soft(self._model(own[None])[0])
-        return Screened(self._start.at(np.append(moved, own)), cost)
+        """Fit the effects' fields, from where they are best or from where they ought to be."""
+        points = np.array([self.x, self._reached])
+        begin = points[int(np.argmin([_soft(row) for row in self._model(points)]))]
+        nothing_held = np.zeros(self.x.size, dtype=bool)
+        problem = Problem(self._model, begin, *self.bounds, nothing_held)
+        own = fit(problem, ACCURACY, robust=True).x if np.isfinite(self.expected) else self.x
+        return Screened(self._with_parameters(own), _soft(self._model(own[None])[0]))
+
+    def stepped(self) -> Screened:
+        """Return the fields where they are best to first order."""
+        return Screened(self._with_parameters(self._reached), self.expected)
+
+    def _with_parameters(self, own: Array) -> Trial:
+        """Return the trial with fields, (k,), and the known parameters' best change."""
+        known = self._start.x[: self._known]
+        final = self._start.at(np.append(known, own))
+        low, high = (bound[: self._known] for bound in self._start.unknowns.bounds)
+        moved = np.clip(known + self._left.step(final), low, high)
+        return self._start.at(np.append(moved, own))
 
     def _model(self, points: Array) -> Array:
-        known = self._start.x[: self._base]
+        known = self._start.x[: self._known]
         return self._left([self._start.at(np.append(known, x)) for x in points])
 
 
+def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
+    """Return the known trial with each further effect of the registry, the best first.
+
+    An effect that cannot be simulated, or that does not stay on, is not in the list.
+    """
+    left = _Left(known, _in_balances(evidence, floor), STEP)
+    return _fitted(_begun(known, sheet, evidence, left))
+
+
+def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
+    """Return the known trial with two further effects of the registry, the best first.
+
+    For two that help only together. Which pairs are fitted is decided to first order.
+    """
+    left = _Left(known, _in_balances(evidence, floor), STEP)
+    nothing = left([known])[0]
+    begun = _begun(known, sheet, evidence, left)
+    pairs = sorted(combinations(begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing))
+    together = []
+    for one, other in pairs[:MOST_FITTED]:
+        start = trial(sheet, (*known.effects, one.effect, other.effect), known)
+        together.append(_Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
+    return _fitted(together)
+
+
+def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:
+    """Return the known trial with each further effect of the registry, the best first.
+
+    By the free run, to first order: for a known trial whose balances are quiet.
+    """
+
+    def missing(trials: list[Trial]) -> Array:
+        return coarse_errors([t.machine for t in trials], evidence)
+
+    left = _Left(known, missing, SLOPE_STEP)
+    begun = _begun(known, sheet, evidence, left, SMALL)
+    return sorted((c.stepped() for c in begun), key=lambda s: s.cost)
+
+
+def _in_balances(evidence: Evidence, floor: Array) -> Missing:
+    def missing(trials: list[Trial]) -> Array:
+        left = evidence.residuals([t.machine for t in trials]) / floor
+        return np.asarray(left[:, :, evidence.fitted].reshape(len(trials), -1))
+
+    return missing
+
+
+def _begun(
+    known: Trial, sheet: Sheet, evidence: Evidence, left: _Left, size: float = 1.0
+) -> list[_Candidate]:
+    """Begin each further effect; size: of its starts, in those on the balances."""
+    force = evidence.residuals([known.machine])[0][: evidence.windows_of_first, 0]
+    found = []
+    for name in REGISTRY:
+        if name not in known.effects:
+            start = trial(sheet, (*known.effects, name), known)
+            members = start.unknowns.members[known.x.size :]
+            starts = _starts(name, members, force, evidence, size)
+            found.append(_Candidate(start, known.x.size, starts, left))
+    return found
+
+
+def _fitted(begun: list[_Candidate]) -> list[Screened]:
+    promising = sorted(begun, key=lambda c: c.expected)[:MOST_FITTED]
+    return sorted((c.fitted() for c in promising), key=lambda s: s.cost)
+
+
+def _expected(one: _Candidate, other: _Candidate, nothing: Array) -> float:
+    """Return what two effects leave when both do their best, to first order.
+
+    nothing: (n,) what is left without them.
+    """
+    low, high = (np.append(a, b) for a, b in zip(one.bounds, other.bounds, strict=True))
+    x, slopes = np.append(one.x, other.x), np.vstack([one.slopes, other.slopes])
+    return _least(one.at_best + other.at_best - nothing, slopes, low - x, high - x)[1]
+
+
+def _least(residual: Array, slopes: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """Return a linear model's best change within bounds, (k,), or none, and its cost."""
+    none, cost = np.zeros(len(slopes)), _soft(residual)
+    if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(residual)):
+        return none, cost
+    change = np.clip(np.linalg.lstsq(slopes.T, -residual, rcond=1e-9)[0], low, high)
+    changed = _soft(residual + change @ slopes)
+    return (change, changed) if changed < cost else (none, cost)
+
+
 def _starts(
-    effect: str, members: tuple[Unknown, ...], left: _Left, evidence: Evidence
+    effect: str, members: tuple[Unknown, ...], force: Array, evidence: Evidence, size: float
 ) -> list[Array]:
-    """Return vectors, (k,), of the effect's fields from which a fit may start."""
+    """Return vectors, (k,), of the effect's fields from which a fit may start.
+
+    force: missing in the first recording, (w,) N. size: of the effect, in trial sizes.
+    """
     x = np.array([unknown.start for unknown in members])
     if effect == "external_load":
-        return [x, *_loads_over_time(members, left.force(), evidence)]
+        return [x, *_loads_over_time(members, force, evidence)]
     sizes = [u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members]
     allowed = [s for s in STARTS if s > 0.0 or any(u.low < 0.0 for u in members)]
-    return [np.where(sizes, s * x, x) for s in allowed]
+    return [np.where(sizes, s * size * x, x) for s in allowed]
 
 
 def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evidence) -> list[Array]:
     """Return starts for a load that depends on time, from the force missing on the piston, N.
 
-    The strongest harmonics, and the stretch of time over which the force is most unlike the rest.
+    A swinging load from the start on, one that sets in later, and the stretch of time over which
+    the force is most unlike the rest.
     """
     time = evidence.time[: force.size]
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
-    spectrum = np.fft.rfft(force - force.mean())
-    frequency = np.fft.rfftfreq(force.size, float(time[1] - time[0]))
-    loads = []
-    for k in np.argsort(-np.abs(spectrum[1:]))[:HARMONICS] + 1:
-        size = 2.0 * np.abs(spectrum[k]) / force.size * at_tip
-        begin = -2.0 * np.pi * frequency[k] * float(time[0])
-        phase = float(np.angle(np.exp(1j * (np.angle(spectrum[k]) + begin))))
-        loads.append((size, frequency[k], phase, 0.0, 1e6))
+    loads = [(*swing, 1e6) for swing in swings(time, force)]
     total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
     first, last = np.triu_indices(total.size, 4)
     unlike = (total[last] - total[first]) ** 2 / (last - first)
     best = int(np.argmax(unlike))
     i, j = int(first[best]), int(last[best]) - 1
     outside = np.delete(force, np.arange(i, j + 1))
-    size = (force[i : j + 1].mean() - (outside.mean() if outside.size else 0.0)) * at_tip
+    size = force[i : j + 1].mean() - (outside.mean() if outside.size else 0.0)
     loads.append((size, 0.0, 0.0, float(time[i]), float(time[j] - time[i])))
     return [
         np.array(
             [
                 (v - u.origin) / u.scale if not u.logarithmic else np.log(v / u.origin)
-                for u, v in zip(members, load, strict=True)
+                for u, v in zip(members, (size * at_tip, *others), strict=True)
             ]
         )
-        for load in loads
+        for size, *others in loads
+    ]
+
+
+def swings(time: Array, force: Array) -> list[tuple[float, float, float, float]]:
+    """Return force, N, frequency, Hz, phase, rad, and begin, s, of a harmonic beside a constant.
+
+    By least squares over a grid of frequencies and begins: the best from the start on, the best
+    that sets in later.
+    """
+    found = []
+    length = float(time[-1] - time[0])
+    for f in np.arange(1, int(FASTEST_SWING * FREQUENCIES * length)) / (FREQUENCIES * length):
+        wave = np.exp(2j * np.pi * f * time)
+        columns = np.stack([wave.real, wave.imag])
+        # sums from each begin to the end: the normal equations of all begins at once
+        after = np.cumsum(np.stack([*columns, *(columns * force)])[:, ::-1], axis=1)[:, ::-1]
+        squares = np.stack([columns[0] ** 2, columns[0] * columns[1], columns[1] ** 2])
+        squares = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1]
+        begins = np.arange(time.size - FEWEST)
+        normal = np.empty((begins.size, 3, 3))
+        normal[:, 0, 0] = time.size
+        normal[:, 0, 1:] = normal[:, 1:, 0] = after[:2, begins].T
+        normal[:, 1, 1], normal[:, 2, 2] = squares[0, begins], squares[2, begins]
+        normal[:, 1, 2] = normal[:, 2, 1] = squares[1, begins]
+        right = np.column_stack([np.full(begins.size, force.sum()), after[2:, begins].T])
+        solved = np.linalg.solve(normal + 1e-9 * time.size * np.eye(3), right[:, :, None])[:, :, 0]
+        gained = np.sum(solved * right, axis=1)
+        for k in (0, 1 + int(np.argmax(gained[1:]))):
+            _, a, b = solved[k]
+            begin = float(time[k]) if k else 0.0
+            phase = math.remainder(math.atan2(-b, a) + 2.0 * math.pi * f * begin, 2.0 * math.pi)
+            found.append((float(gained[k]), k > 0, (math.hypot(a, b), float(f), phase, begin)))
+    return [
+        max((g, swing) for g, late, swing in found if late is kind)[1] for kind in (False, True)
     ]
 
 

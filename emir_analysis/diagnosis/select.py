@@ -25,7 +25,12 @@ def score(mean_squares: Array, independent: float, unknowns: int) -> float:
 
 
 def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
-    """Score a trial on the windows of recordings behind the part that the fit has seen."""
+    """Score a trial on the windows of recordings behind the part that the fit has seen.
+
+    Zero where the signals allow no balance.
+    """
+    if not np.any(evidence.fitted):
+        return 0.0
     unseen = evidence.behind(SEEN)
     missing = (evidence.residuals([trial.machine])[0] / floor)[unseen][:, evidence.fitted]
     count = len(evidence.experiments)

@@ -15,6 +15,7 @@ from emir_plant.parameters import Machine, groups
 from emir_plant.sheet import Sheet
 
 WIDE = 20.0  # an effect's parameter whose range spans more than this factor is fitted as its log
+ROUNDING = 1e-9  # by which a logarithmic x stays inside, so that its value does, too
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,8 @@ def _of_effect(effect: str) -> list[Unknown]:
         value = float(kind.trial.get(name, getattr(stated, name)))
         path = f"effects.{effect}.{name}"
         if about.low > 0.0 and about.high / about.low > WIDE:
-            low, high = math.log(about.low / value), math.log(about.high / value)
+            low = math.log(about.low / value) + ROUNDING
+            high = math.log(about.high / value) - ROUNDING
             members.append(Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True))
         else:
             low, high = about.low / abs(value), about.high / abs(value)

@@ -10,6 +10,7 @@ import recorded
 
 from emir_analysis import bags
 from emir_analysis.diagnosis import Diagnosis, command, summary
+from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.unknowns import unknowns, with_values
 from emir_analysis.errors import InputError
 from emir_plant.parameters import Machine
@@ -69,6 +70,26 @@ def test_a_healthy_machine_gets_its_parameters_and_no_effect(
         assert fitted.low < fitted.value < fitted.high
     for signal in result.signals.values():  # on a recording that the fit has not seen
         assert signal.refitted < 1.1 * signal.noise < signal.nominal
+    with_stroke_alone(folder, tmp_path)
+
+
+def with_stroke_alone(folder: Path, bags_: Path) -> None:
+    """Demand the same of a healthy machine's recordings a and b when all but the stroke is gone."""
+    lines = recorded.SIGNAL_MAP.splitlines(keepends=True)
+    kept = [line for line in lines if line.startswith(("valve_command", "piston_stroke"))]
+    (bags_ / "signals.yaml").write_text("".join(kept))
+    result = command(
+        bags_ / "a",
+        folder / "datasheet.yaml",
+        bags_ / "signals.yaml",
+        bags_ / "b",
+        None,
+        bags_ / "stroke.html",
+        lambda _: None,
+    )
+    assert result.verdict == "nothing_missing", summary(result)
+    assert set(result.untold) == {*BALANCES} - {"linkage"}
+    assert result.signals["piston_stroke"].refitted < 1.5 * result.signals["piston_stroke"].noise
 
 
 def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from emir_analysis.info import info, text
+from emir_analysis.recorded_orders import orders
 from emir_msgs_py.topics import CASCADE_TERMS, CONTROL_PERIOD_NS
 from emir_ros.cascade_node import CascadeNode
 from emir_ros.force_loop_node import ForceLoopNode
@@ -135,7 +136,11 @@ def test_a_change_is_recorded(tmp_path: Path) -> None:
         for _ in range(20):
             executor.spin_once(timeout_sec=0.01)
     until(lambda: recorder.writer.message_count > 0)
+    until(lambda: "/orders" in recorder.writer.topics)
     recorder.close()
+    (order, *_) = orders(bag, "cascade_node")
+    assert order.what == "set"
+    assert 2.0 < order.values["gain"] <= 2.0 + 0.01 * sent
     (first, *_) = info(bag).changes.values()
     assert (first.node, first.name) == ("/cascade_node", "gain")
     assert 2.0 < float(first.value) <= 2.0 + 0.01 * sent

@@ -1,0 +1,48 @@
+"""Where the fit of an effect begins, and that it goes on from there."""
+
+import math
+
+import numpy as np
+import pytest
+
+from emir_analysis.diagnosis.fit import Problem, fit
+from emir_analysis.diagnosis.screening import swings
+from emir_analysis.signals import Array
+
+TIME = np.arange(0.5, 59.5, 0.25)  # s
+
+
+def swinging(size: float, frequency: float, phase: float, begin: float) -> Array:
+    """Return a load that swings from its begin on."""
+    wave = np.cos(2.0 * math.pi * frequency * (TIME - begin) + phase)
+    return np.where(begin <= TIME, size * wave, 0.0)
+
+
+def test_a_load_that_starts_to_swing_is_seen_beside_a_constant_and_noise() -> None:
+    noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
+    _, late = swings(TIME, swinging(20e3, 0.21, -1.2, 12.0) + 30e3 + noise)
+    size, frequency, phase, begin = late
+    assert size == pytest.approx(20e3, rel=0.05)
+    assert frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert begin == pytest.approx(12.0, abs=0.5)
+    off = 2.0 * math.pi * frequency * (12.0 - begin) + phase + 1.2
+    assert abs(math.remainder(off, 2.0 * math.pi)) < 0.3
+
+
+def test_a_load_that_swings_all_the_time_is_seen() -> None:
+    always, _ = swings(TIME, swinging(20e3, 0.21, -1.2, 0.0))
+    assert always[1] == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert always[3] == 0.0
+
+
+def test_a_robust_fit_goes_on_after_steps_that_were_too_long() -> None:
+    """Errors of a hundred times the noise: the soft loss is flat there and steps overshoot."""
+    wave = np.sin(2.0 * np.pi * 0.214 * TIME + 1.6)
+
+    def model(points: Array) -> Array:
+        return np.array([150.0 * (np.sin(2.0 * np.pi * x[0] * TIME + x[1]) - wave) for x in points])
+
+    free = np.zeros(2, dtype=bool)
+    begin, low, high = np.array([0.2115, 1.6]), np.zeros(2), np.array([10.0, 6.3])
+    found = fit(Problem(model, begin, low, high, free), 1e-3, robust=True)
+    assert found.x == pytest.approx([0.214, 1.6], abs=5e-5)

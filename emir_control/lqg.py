@@ -98,7 +98,7 @@ class LqgParameters:
         "s", 0.0, 10.0, "from a move's end to the rest after it", default=1.0
     )
     other_load: float = quantity(
-        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=1.2e4
+        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=3e4
     )
 
     def __post_init__(self) -> None:

@@ -188,7 +188,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True)
 class Lqg:
-    """The control law; the planning takes some tenths of a second, a step a tenth of a millisecond."""
+    """The control law. A plan takes some tenths of a second, a step a tenth of a millisecond."""
 
     parameters: LqgParameters
 

@@ -98,7 +98,7 @@ class LqgParameters:
         "s", 0.0, 10.0, "from a move's end to the rest after it", default=1.0
     )
     other_load: float = quantity(
-        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=1.2e4
+        "N", 1.0, 1e6, "force at rest off what it was: the payload is read anew", default=3e4
     )
 
     def __post_init__(self) -> None:
@@ -188,7 +188,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True)
 class Lqg:
-    """The control law; the planning takes some tenths of a second, a step some ten us."""
+    """The control law. A plan takes some tenths of a second, a step a tenth of a millisecond."""
 
     parameters: LqgParameters
 

@@ -8,6 +8,7 @@ import pytest
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.compare import Run, dynamic_deflection
+from emir_analysis.disturbance import LoadChange
 from emir_analysis.machine_model import actuator, lqg_parameters
 from emir_analysis.node_controls import LqgControl
 from emir_common.parameter_tree import with_values
@@ -130,3 +131,26 @@ def test_mpc_keeps_to_what_the_drive_can_give() -> None:
 def _law() -> Regulator:
     p = lqg_parameters(joint1())
     return regulator(p.boom.loaded(300.0), Lqg(p).drive, 0.5, p.period, p.regulator)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.0, 400.0), (400.0, 0.0)])
+def test_a_load_that_comes_or_goes_in_a_move_is_noticed(before: float, after: float) -> None:
+    """By the innovation; the piston ends nearer to its place than with a slow estimate."""
+    machine = with_values(joint1(), {"supply.p0": 3.2e7, "geometry.payload": before})
+    p = replace(lqg_parameters(joint1()), actuator=actuator(machine))
+    moving = replace(p.regulator.moving, sudden_load=p.regulator.moving.load_drift)
+    slow = replace(p, regulator=replace(p.regulator, moving=moving))
+    trajectory = named("lift-lower", TrajectoryParameters(pause=20.0))
+    off = []
+    for parameters in (p, slow):
+        loop = ClosedLoop(
+            Plant(machine),
+            trajectory,
+            LqgControl(Lqg(parameters)),
+            change=LoadChange(2.6, after),
+        )
+        signals = loop.run(math.radians(50.0), 2e6, 8.0)
+        reached = signals["true_stroke"][-125:]
+        off.append(abs(reached - signals["reference_stroke"][-1]).max())
+    assert off[0] < 3e-3
+    assert off[0] < 0.8 * off[1]

@@ -21,6 +21,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from emir_control.limits import LimitParameters
+from emir_control.prefilter import PrefilterParameters, joint_angle
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
@@ -35,7 +37,9 @@ from emir_msgs_py.topics import (
 )
 from emir_ros import qos
 from emir_ros.cascade_node import CascadeNode
+from emir_ros.diagnostics import Level
 from emir_ros.force_loop_node import ForceLoopNode
+from emir_ros.lqg_node import LqgNode
 from emir_ros.pfc_node import PfcNode
 from emir_ros.plant_node import PlantNode
 from emir_ros.selector_node import SelectorNode
@@ -282,3 +286,25 @@ def test_a_command_that_comes_twice_ends_a_run_in_lock_step() -> None:
             publisher.publish(conversions.message(VELOCITY_COMMAND, 0, {"velocity_command": 0.02}))
         with pytest.raises(NodeError, match=r"velocity_command came twice for t = 0\.000 s"):
             graph.until(lambda: False, "nothing is said")
+
+
+def test_lqg_says_that_it_is_held_off_the_end_of_the_stroke(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Standing at the end, told of a move beyond it: planned to stay, and said."""
+    with _graph(LqgNode) as graph:
+        node = graph.nodes[1]
+        assert isinstance(node, LqgNode)
+        said: list[tuple[Level, str]] = []
+        monkeypatch.setattr(node.diagnostics, "say", lambda *words: said.append(words))
+        limits = LimitParameters()
+        line = limits.stroke_high - limits.end_margin
+        signals = {"reference_stroke": line, "angle": joint_angle(line, PrefilterParameters())}
+        signals |= {"pressure_lifting": 20e5, "pressure_lowering": 20e5, "deflection": 0.0}
+        for distance, since in ((0.0, -9.0), (0.05, -0.5)):
+            move = {"move_since": since, "move_duration": 3.3, "move_distance": distance}
+            node._run(0, [signals | move])
+        move["move_since"] = 0.5
+        node._run(0, [signals | move])
+        assert said[0] == (Level.OK, "running")
+        assert said[-1] == (Level.WARN, "held off the end of the stroke")

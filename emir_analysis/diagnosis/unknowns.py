@@ -15,7 +15,7 @@ from emir_plant.parameters import Machine, groups
 from emir_plant.sheet import Sheet
 
 WIDE = 20.0  # an effect's parameter whose range spans more than this factor is fitted as its log
-ROUNDING = 1e-9  # by which a logarithmic x stays inside, so that its value does, too
+ROUNDING = 1e-9  # relative, by which x stays inside its bounds, so that its value does, too
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,7 @@ def _of_effect(effect: str) -> list[Unknown]:
             high = math.log(about.high / value) - ROUNDING
             members.append(Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True))
         else:
-            low, high = about.low / abs(value), about.high / abs(value)
+            low = (about.low + ROUNDING * abs(about.low)) / abs(value)
+            high = (about.high - ROUNDING * abs(about.high)) / abs(value)
             members.append(Unknown(path, about.unit, 0.0, abs(value), low, high, 1.0, False))
     return members

@@ -7,7 +7,10 @@ import pytest
 
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.screening import swings
+from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
+from emir_plant.sheet import Sheet, joint1
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
 
@@ -33,6 +36,13 @@ def test_a_load_that_swings_all_the_time_is_seen() -> None:
     always, _ = swings(TIME, swinging(20e3, 0.21, -1.2, 0.0))
     assert always[1] == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
     assert always[3] == 0.0
+
+
+@pytest.mark.parametrize("effect", REGISTRY)
+def test_an_effect_may_be_tried_at_the_edges_of_its_range(effect: str) -> None:
+    tried = unknowns(Sheet(joint1(), {}, {}, ()), (effect,))
+    for edge in tried.bounds:
+        tried.at(edge)  # raises outside the range
 
 
 def test_a_robust_fit_goes_on_after_steps_that_were_too_long() -> None:

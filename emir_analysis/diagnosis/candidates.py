@@ -14,7 +14,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import Problem, Solution, fit
+from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
@@ -25,6 +25,7 @@ from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
 ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
+FINE_ACCURACY = 1e-5  # the same of the last fit: flat directions still matter on another recording
 ROUGH = 3e-2  # the same where only the way to the optimum is wanted
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
@@ -152,9 +153,16 @@ def _shapes(start: Trial, effect: str) -> Array:
 
 
 def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial that was fitted to a part of the recordings' free run to the whole."""
+    """Fit a trial that was fitted to a part of the recordings' free run to the whole.
+
+    In the end with slopes of the free run itself, over short steps: near the optimum the coarse
+    ones point a little beside it.
+    """
     x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
-    return known.continued(fit(_free_run_problem(known, evidence, 1.0, x), ACCURACY))
+    problem = _free_run_problem(known, evidence, 1.0, x)
+    near = fit(problem, ACCURACY)
+    fine = replace(problem, start=near.x, coarse=None, step=STEP)
+    return known.continued(fit(fine, FINE_ACCURACY))
 
 
 def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) -> Problem:

@@ -142,7 +142,6 @@ def _latency(rate: float, seconds: float) -> Part:
     while not here.poll(0.01):
         publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
     here.recv()
-    keep_out_of_garbage_collection()
     period, sent = 1.0 / rate, 0
     begin = time.monotonic()
     while sent < rate * seconds:

@@ -61,7 +61,7 @@ def make_executor() -> Iterator[Any]:
 
 
 def keep_out_of_garbage_collection() -> None:
-    """Let the collector pass over what stands when the run begins, for good.
+    """Let the collector pass over what stands now, for as long as this process lives.
 
     Going through all of that (libraries, nodes) takes longer than a control period.
     """

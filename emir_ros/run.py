@@ -1,6 +1,7 @@
 """`emir run`: start the graph, wait for the machine's run to end, stop it, show its figures."""
 
 import argparse
+import gc
 import signal
 import subprocess
 import sys
@@ -20,7 +21,6 @@ from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
 from emir_ros.main import (
-    keep_out_of_garbage_collection,
     make_executor,
     start_ros,
     take_the_rest,
@@ -94,6 +94,7 @@ def run_plan(plan: Plan, processes: str) -> int:
         with ros_arguments(plan) as ros:
             if processes == "one":
                 _run_in_one_process(plan, ros)
+                gc.collect()  # a node that still waits for that stays in the ROS graph
             else:
                 _run_in_many_processes(plan, ros)
     except (KeyboardInterrupt, ExternalShutdownException):
@@ -115,7 +116,6 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
                 nodes[name] = _node_class(name)(ros)
                 executor.add_node(nodes[name])
             plant = nodes["plant_node"]
-            keep_out_of_garbage_collection()
             while not plant.done:
                 if stop.made:
                     raise KeyboardInterrupt

@@ -320,7 +320,7 @@ def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
 ) -> Array:
     """Run m machines under the same commands, one by one on each core.
 
-    starts: (m, n) states; parameters: (m,) records; step: as for `advance`. Returns
+    starts: (m, n) states; parameters: (m,) records; step: as for `simulate`. Returns
     (m, 1 + k // every, len(Truth)).
     """
     machines = parameters.size

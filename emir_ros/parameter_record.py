@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
 PERIOD = 0.02  # s between looks whether the nodes have been discovered
+PATIENCE = 50  # looks without an answer, after which a node is asked again
 
 
 class ParameterRecord:
     """Asks the named nodes as soon as they are there, and hands over what they answered.
+
+    A node is asked again when no answer comes: the middleware drops one that is given before its
+    way back has been discovered.
 
     nodes: names, in the namespace of `node`. found(answers) is called once, when all have
     answered: {node: {parameter: value}}, both in alphabetical order.
@@ -30,6 +34,7 @@ class ParameterRecord:
     ) -> None:
         self._clients = {name: AsyncParameterClient(node, name) for name in nodes}
         self._waiting = set(nodes)
+        self._looks = dict.fromkeys(nodes, PATIENCE)  # since each was asked
         self._answers: dict[str, dict[str, Any]] = {}
         self._found = found
         self._timer = node.create_timer(PERIOD, self._look)
@@ -37,8 +42,9 @@ class ParameterRecord:
 
     def _look(self) -> None:
         for name in sorted(self._waiting):
-            if self._clients[name].services_are_ready():
-                self._waiting.remove(name)
+            self._looks[name] += 1
+            if self._looks[name] > PATIENCE and self._clients[name].services_are_ready():
+                self._looks[name] = 0
                 self._futures.append(
                     self._clients[name].list_parameters(
                         callback=lambda future, name=name: self._listed(name, future.result())
@@ -56,9 +62,12 @@ class ParameterRecord:
         )
 
     def _got(self, node: str, names: list[str], answer: GetParameters.Response) -> None:
+        if node not in self._waiting:  # the answer to an earlier question, after all
+            return
+        self._waiting.remove(node)
         values = map(parameter_value_to_python, answer.values)
         self._answers[node] = dict(zip(names, values, strict=True))
-        if len(self._answers) == len(self._clients):
+        if not self._waiting:
             self._found(dict(sorted(self._answers.items())))
 
 

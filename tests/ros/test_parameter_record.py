@@ -1,0 +1,68 @@
+"""The parameters of other nodes, also when the middleware drops an answer."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+
+from emir_ros import parameter_record
+from emir_ros.parameter_record import ParameterRecord
+
+
+@pytest.fixture(autouse=True)
+def ros(ros_domain: int) -> Iterator[None]:
+    rclpy.init()
+    yield
+    rclpy.shutdown()
+
+
+class Dropped(AsyncParameterClient):
+    """Asks, but the first answer of either kind never comes."""
+
+    dropped: set[str]
+
+    def list_parameters(self, *args: Any, **kw: Any) -> Any:
+        """Ask for the names."""
+        return self._dropped_once("list") or super().list_parameters(*args, **kw)
+
+    def get_parameters(self, *args: Any, **kw: Any) -> Any:
+        """Ask for the values."""
+        return self._dropped_once("get") or super().get_parameters(*args, **kw)
+
+    def _dropped_once(self, what: str) -> Any:
+        if what in self.dropped:
+            return None
+        self.dropped.add(what)
+        return Future()
+
+
+def test_a_dropped_answer_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dropped, "dropped", set(), raising=False)
+    monkeypatch.setattr(parameter_record, "AsyncParameterClient", Dropped)
+    asked, asking = Node("asked"), Node("asking")
+    asked.declare_parameter("gain", 2.0)
+    found: list[dict[str, dict[str, Any]]] = []
+    executor = SingleThreadedExecutor()
+    for node in (asked, asking):
+        executor.add_node(node)
+    record = ParameterRecord(asking, ["asked"], found.append)
+    deadline = time.monotonic() + 60.0
+    try:
+        while not found and time.monotonic() < deadline:
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        executor.shutdown()
+        for node in (asked, asking):
+            node.destroy_node()
+    del record
+    assert Dropped.dropped == {"list", "get"}
+    assert [answers["asked"]["gain"] for answers in found] == [2.0]

@@ -211,7 +211,8 @@ class _Search:
         """
         least = 0.5 * self._excess(best.trial)
         better = self._better(self._on_free_run(best), best)
-        return [t for t in better if self._excess(t.trial) < least]
+        close = min(map(_free, better), default=0.0) + STRONG
+        return [t for t in better if _free(t) < close and self._excess(self.whole(t.trial)) < least]
 
     def _on_free_run(self, best: Tried) -> list[Tried]:
         """Return the trials with one effect more that promise most on the free run."""

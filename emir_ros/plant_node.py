@@ -131,7 +131,7 @@ class PlantNode(Shell):
         if self._recorder and self._recorded < now - now % CONTROL_PERIOD_NS:
             return
         if self._is_over():
-            self.done = True
+            self.end()
             return
         fast = self._valves.every == "plant"
         for _ in range(1 if fast else CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
@@ -191,7 +191,8 @@ class PlantNode(Shell):
             self._step(command)
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self._show_progress()
-        self.done = self._is_over()
+        if self._is_over():
+            self.end()
 
     def _fresh_command(self) -> Signals:
         if self._command is None:

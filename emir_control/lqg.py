@@ -45,9 +45,12 @@ class FillParameters:
     """
 
     lead: float = quantity("s", 0.0, 30.0, "before the move; 0: no filling", default=7.0)
-    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=3e5)
+    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=1e5)
     rate: float = quantity("1/s", 0.01, 10.0, "speed over way left", default=0.8)
-    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=6e-4)
+    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=1e-3)
+    stopping: float = quantity(
+        "s", 0.032, 10.0, "from the slowest speed; a period of the boom", default=1.5
+    )
     acceleration: float = quantity("m/s^2", 1e-4, 1.0, "of the piston", default=2.5e-3)
     damping: float = quantity("1/s", 0.0, 20.0, "speed by the force's deviation / k_h", default=3.0)
 
@@ -58,6 +61,8 @@ class FillParameters:
         self, filled: "Filled", missing: float, drive: Actuator, stroke: float, dt: float
     ) -> float:
         """Return the speed, m/s, with a pressure, Pa, missing to the aim."""
+        if missing <= 0.0:
+            return max(filled.velocity - self.slowest / self.stopping * dt, 0.0)
         left = missing * drive.compression(stroke)
         wanted = max(self.rate * left, self.slowest)
         return min(wanted, filled.velocity + self.acceleration * dt)
@@ -76,7 +81,7 @@ class LqgParameters:
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
     limits: LimitParameters = field(default_factory=LimitParameters)
     softness: float = quantity(
-        "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
+        "1", 0.1, 2.0, "of the stated k_h, what is reckoned with; see softness.py", default=0.86
     )
     allowance: float = quantity(
         "1", 0.0, 1.0, "of the plan's deflection over the smallest, for less travel", default=0.03
@@ -115,10 +120,14 @@ class Rest(NamedTuple):
 
 
 class Filled(NamedTuple):
-    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s."""
+    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s.
+
+    over: it has come to its end.
+    """
 
     moved: float
     velocity: float
+    over: bool = False
 
 
 NOT_FILLED = Filled(0.0, 0.0)
@@ -198,6 +207,12 @@ class Lqg:
         p = self.parameters
         return Actuator(p.actuator, p.softness)
 
+    @cached_property
+    def planner(self) -> Planner:
+        """What plans the moves."""
+        p = self.parameters
+        return Planner(self.drive, p.period, self._late, p.allowance)
+
     def initial(self, inputs: LqgInputs) -> LqgState:
         """Return the state of a machine that rests with what is measured now."""
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
@@ -217,12 +232,15 @@ class Lqg:
         state = self._prepared(state, inputs)
         if self._to_fill(state, inputs):
             return self._filling(state, inputs, dt)
-        if (state.moving or state.filled.moved) and inputs.move.since < self._begins:
+        if state.filled.moved and not (state.filled.over or state.moving):
+            state = self._full(state, inputs)
+        waits = state.moving and inputs.move.since < self._begins
+        if waits and not state.filled.moved:
             return self._waiting(state, inputs)
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
-        arrived = time >= plan.ends
+        arrived = waits or time >= plan.ends
         estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
         loaded = surprise > (1.0 if state.loaded else SURPRISE)
         state = state._replace(surprise=surprise, loaded=loaded)
@@ -294,17 +312,17 @@ class Lqg:
         """Return the shut valve of a move that is planned and has not begun."""
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
         outputs = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
-        filled = state.filled._replace(velocity=0.0)
-        return state._replace(command=0.0, logic=logic, filled=filled), outputs
+        return state._replace(command=0.0, logic=logic), outputs
 
     def _to_fill(self, state: LqgState, inputs: LqgInputs) -> bool:
         """Tell whether the lowering chamber has to be filled before the move that comes."""
         move, fill = inputs.move, self.parameters.fill
         if state.moving or move.distance >= 0.0 or not -fill.lead <= move.since < 0.0:
             return False
-        if state.filled.moved and not state.filled.velocity:
-            return False  # it has been full already
-        return inputs.pressure_lifting < self.parameters.actuator.threshold + fill.margin
+        if state.filled.over:
+            return False
+        missing = self.parameters.actuator.threshold + fill.margin - inputs.pressure_lifting
+        return missing > 0.0 or state.filled.velocity > 0.0
 
     def _filling(
         self, state: LqgState, inputs: LqgInputs, dt: float
@@ -316,7 +334,9 @@ class Lqg:
         missing = p.threshold + self.parameters.fill.margin - inputs.pressure_lifting
         velocity = self.parameters.fill.velocity(state.filled, missing, drive, stroke, dt)
         force = drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
-        pushed = (force - state.rest.force) / drive.stiffness(stroke)
+        before = joint_angle(inputs.reference, self.parameters.actuator.static)
+        heavier = self._weight(inputs.angle) / self._weight(before)
+        pushed = (force - heavier * state.rest.force) / drive.stiffness(stroke)
         given = max(velocity + self.parameters.fill.damping * pushed, 0.0)
         opening = drive.opening(-given, oil)
         command = drive.command(opening) - (0.5 * self.parameters.hysteresis if given else 0.0)
@@ -328,12 +348,36 @@ class Lqg:
         after = state._replace(command=command, logic=logic, filled=filled, rest=rest)
         return after, outputs
 
+    def _weight(self, angle: float) -> float:
+        """Return the force at rest at an angle, rad, over the torque of the level boom, 1/m."""
+        return math.cos(angle) / piston_velocity(1.0, angle, self.parameters.actuator.static)
+
+    def _full(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that rests where the filling has ended: the boom swings from it."""
+        rest = state.rest._replace(angle=inputs.angle)
+        filled = state.filled._replace(over=True)
+        here = inputs._replace(move=NO_MOVE)
+        return self._begin(rest, here, state.logic, state.command, filled)
+
+    def _onward(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state at the start of a move from where the chamber was filled.
+
+        What is known of the swing and of what is under way stays known.
+        """
+        rest = state.rest._replace(angle=float(state.plan.angle[-1]))
+        begun = self._begin(rest, inputs, state.logic, state.command, state.filled)
+        return begun._replace(
+            estimate=state.estimate, past=state.past, openings=state.openings, rest=state.rest
+        )
+
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
         p = self.parameters
         if self._under_way(inputs.move):
             if state.moving:
                 return state
+            if state.filled.over:
+                return self._onward(state, inputs)
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
         last = state.rest
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
@@ -368,9 +412,7 @@ class Lqg:
 
     def _payload(self, force: float, angle: float) -> float:
         """Return the payload, kg, that a force at rest, N, holds at an angle of the joint, rad."""
-        linkage = self.parameters.actuator.static
-        torque = force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
-        return self.parameters.boom.payload(torque)
+        return self.parameters.boom.payload(force / self._weight(angle))
 
     def _begin(
         self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
@@ -381,9 +423,9 @@ class Lqg:
         ends = inputs.reference, inputs.reference + move.distance
         start, end = here, _ = self._off_the_ends(rest, ends)
         cut = (start, end) != ends
-        if move.distance and filled.moved:
+        if filled.moved:
             start = piston_stroke(rest.angle, linkage)
-        move = move._replace(distance=end - start)
+        move = move._replace(distance=end - start if move.distance else 0.0)
         angle = joint_angle(here, linkage)
         payload = self._payload(rest.force, angle)
         boom = p.boom.loaded(payload)
@@ -401,8 +443,7 @@ class Lqg:
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
             return resting(boom, self.drive, start)
-        p = self.parameters
-        return Planner(self.drive, p.period, self._late, p.allowance).plan(boom, start, move)
+        return self.planner.plan(boom, start, move)
 
     def _off_the_ends(self, rest: Rest, ends: tuple[float, float]) -> tuple[float, float]:
         """Return start and end of a move, m, kept off the ends of the stroke.
@@ -443,16 +484,10 @@ class Lqg:
 
     def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""
-        law = state.regulator
-        return -float(estimate[law.flow]) - float(law.feedback @ self._off(state, estimate))
+        return state.regulator.command(estimate, np.array(state.past))
 
     def _off(self, state: LqgState, estimate: Array) -> Array:
-        """Return what the feedback acts on: (q, q', s - f, past u + d)."""
-        law = state.regulator
-        off = np.append(estimate[: law.controlled], np.array(state.past) + estimate[law.flow])
-        off[law.controlled - 1] -= estimate[law.force]
-        off[: law.controlled] -= law.held * estimate[law.load]
-        return off
+        return state.regulator.off(estimate, np.array(state.past))
 
     def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
         """Tell whether the valve stays shut."""

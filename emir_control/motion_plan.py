@@ -105,7 +105,7 @@ class Planner:
         middle = Drive(
             arm=move.distance / turn,
             stiffness=drive.stiffness(start + 0.5 * move.distance),
-            slope=(_holding(boom, drive, ends[1]) - _holding(boom, drive, ends[0])) / turn,
+            slope=(holding(boom, drive, ends[1]) - holding(boom, drive, ends[0])) / turn,
             low=-linkage.flow_lowering / linkage.area_lowering,
             high=linkage.flow_lifting / linkage.area_lifting,
         )
@@ -123,7 +123,7 @@ class Planner:
             angle=angle,
             stroke=np.array([piston_stroke(each, linkage) for each in angle]),
             bending=shape @ (boom.tip_angle - boom.joint),
-            force=pushed + np.array([_holding(boom, drive, each) for each in angle]),
+            force=pushed + np.array([holding(boom, drive, each) for each in angle]),
             deflection=motion.deflection,
         )
 
@@ -140,14 +140,14 @@ def resting(boom: Boom, drive: Actuator, stroke: float) -> MotionPlan:
     """Return the plan to stay at a stroke, m."""
     angle = joint_angle(stroke, drive.parameters.static)
     bending = math.cos(angle) * float((boom.tip_angle - boom.joint) @ boom.sag())
-    still = (angle, stroke, bending, _holding(boom, drive, angle), 0.0)
+    still = (angle, stroke, bending, holding(boom, drive, angle), 0.0)
     angles, strokes, bendings, forces, deflections = (np.full(2, value) for value in still)
     return MotionPlan(
         drive.stiffness(stroke), 0.0, 1.0, angles, strokes, bendings, forces, deflections
     )
 
 
-def _holding(boom: Boom, drive: Actuator, angle: float) -> float:
+def holding(boom: Boom, drive: Actuator, angle: float) -> float:
     """Return the piston force, N, that holds the boom at an angle, rad."""
     arm = piston_velocity(1.0, angle, drive.parameters.static)
     return boom.holding_torque * math.cos(angle) / arm

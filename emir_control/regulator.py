@@ -141,6 +141,20 @@ class Regulator:
         """Return the index of p."""
         return 2 * self.modes + 3
 
+    def off(self, estimate: Array, past: Array) -> Array:
+        """Return what the feedback acts on, (q, q', s - f, past u + d), held still under p.
+
+        estimate: (n,) x. past: (l,) u, m/s.
+        """
+        off = np.append(estimate[: self.controlled], past + estimate[self.flow])
+        off[self.controlled - 1] -= estimate[self.force]
+        off[: self.controlled] -= self.held * estimate[self.load]
+        return off
+
+    def command(self, estimate: Array, past: Array) -> float:
+        """Return u off the plan, m/s."""
+        return -float(estimate[self.flow]) - float(self.feedback @ self.off(estimate, past))
+
 
 def regulator(
     boom: Boom, drive: Actuator, stroke: float, period: float, p: RegulatorParameters

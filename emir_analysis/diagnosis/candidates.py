@@ -61,7 +61,7 @@ class Trial:
     @property
     def spread(self) -> Array:
         """Standard deviations of x, (k,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
     def at(self, x: Array) -> "Trial":
         """Return the trial with other parameters, (k,)."""

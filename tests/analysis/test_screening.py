@@ -90,3 +90,13 @@ def test_an_effect_that_shows_only_when_it_is_large_is_seen() -> None:
     first = screen(plain, sheet, evidence, floor)[0].trial
     assert first.name == "supply_pressure_droop"
     assert first.machine.effects.supply_pressure_droop.resistance == pytest.approx(1.9e10, rel=0.1)
+
+
+def test_what_the_residuals_do_not_depend_on_stays_unknown() -> None:
+    def model(points: Array) -> Array:
+        return np.array([x[0] * TIME - 2.0 * TIME for x in points])
+
+    free = np.zeros(2, dtype=bool)
+    found = fit(Problem(model, np.ones(2), np.zeros(2), np.full(2, 9.0), free), 1e-6)
+    assert found.covariance[0, 0] == pytest.approx(1.0 / np.sum(TIME**2), rel=1e-3)
+    assert found.covariance[1, 1] == math.inf

@@ -102,7 +102,7 @@ def search(
         followed = better[:BREADTH]
     block = max(1, round(slow))
     best = min(accepted, key=lambda t: t.unseen)
-    good = [t for t in accepted if _is_as_good(t, best, block)]
+    good = [t for t in tried.values() if _is_as_good(t, best, block)]
     chosen = min(good, key=lambda t: (t.fitted.x.size, t.unseen))
     rivals = [t for t in good if t is not chosen and t.fitted.x.size <= chosen.fitted.x.size]
     return Search(plain, chosen, tuple(tried.values()), tuple(rivals))
@@ -134,8 +134,7 @@ def _without(
         fewer = []
         for name in best.fitted.effects:
             left = tuple(effect for effect in best.fitted.effects if effect != name)
-            if frozenset(left) not in tried:
-                fewer.append(tested(fitted(left, best.fitted)))
+            fewer.append(tested(fitted(left, best.fitted)))  # again: now from a better start
         tried |= {_key(t): t for t in fewer}
         fewer = [t for t in fewer if t.unseen < best.unseen]
         if not fewer:

@@ -95,10 +95,13 @@ def spin(executor: Any, node: Shell, ended: Future, stop: StopRequest) -> None:
 
 
 def take_the_rest(executor: Any, *nodes: Shell) -> None:
-    """Let nodes that hear everybody take what has arrived, until nothing more comes."""
+    """Let nodes that hear everybody take what has arrived; the others are over."""
     hearing = [node for node in nodes if node.hears_everybody]
     if not hearing:
         return
+    for node in nodes:
+        if node not in hearing:
+            executor.remove_node(node)
     heard, end = -1, time.monotonic() + LONGEST_REST
     while time.monotonic() < end and sum(node.heard for node in hearing) > heard:
         heard = sum(node.heard for node in hearing)

@@ -271,7 +271,7 @@ def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
     assert finished.returncode == 0, finished.stderr
     recorded = _read_with_rosbags(bag)
     stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
-    assert len(stroke) > 150  # of 375: the computer may be busy
+    assert 150 < len(stroke) <= 377  # of 377: the computer may be busy, but does not go on
     periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
     assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)
     strokes = [

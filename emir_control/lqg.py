@@ -22,15 +22,21 @@ from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
 from emir_control.limits import LimitParameters, off_the_ends
-from emir_control.motion_plan import MotionPlan, Planner, Target, resting
-from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
-from emir_control.regulator import Regulator, RegulatorParameters, regulator
+from emir_control.motion_plan import MotionPlan, Planner, Target, UnderWay, resting
+from emir_control.prefilter import (
+    joint_angle,
+    piston_stroke,
+    piston_velocity,
+)
+from emir_control.regulator import Filter, Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
 
 Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
+TO_JOIN = 1.0  # s of a move that have to be left for another one to take over
+SAME = 1e-6  # m
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
 SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
@@ -140,7 +146,8 @@ class LqgState(NamedTuple):
     gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
     of the valve of commands that are under way, the newest first. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
-    seems to come or to go. reference: m, of the last period of standing by.
+    seems to come or to go. reference: m, of the last period of standing by. known: it stands by
+    since before the move. joins: it may take over in the move.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -161,6 +168,8 @@ class LqgState(NamedTuple):
     surprise: float = 1.0
     loaded: bool = False
     reference: float = math.nan
+    known: bool = False
+    joins: bool = False
 
 
 class LqgInputs(NamedTuple):
@@ -241,7 +250,8 @@ class Lqg:
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
         arrived = waits or time >= plan.ends
-        estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
+        known = law.at_rest if arrived else law.moving
+        estimate, surprise = self._corrected(state, inputs, target, known)
         loaded = surprise > (1.0 if state.loaded else SURPRISE)
         state = state._replace(surprise=surprise, loaded=loaded)
         from_plan = plan.velocity(time + self._late, dt)
@@ -274,10 +284,10 @@ class Lqg:
         """Return the next state while another one drives, and whether this one may take over.
 
         It may where the reference has rested for long enough to read the payload, swinging boom or
-        not.
+        not; and in a move that it has watched from the start, with time left.
         """
         if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
-            return state._replace(reference=math.nan), False
+            return state._replace(reference=math.nan, known=False, joins=False), False
         moves = inputs.reference != state.reference or self._under_way(inputs.move)
         enough = STANDING_BY * self._enough
         rest = self._read(state.rest, inputs, 1 if moves else state.rest.periods + 1, enough)
@@ -285,7 +295,54 @@ class Lqg:
         state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
         if rest.periods == enough:
             state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
-        return state._replace(reference=inputs.reference), rest.periods >= enough
+        elif rest.periods < enough:
+            state = self._watched(state, inputs)
+        place = state.plan.at(math.inf).stroke
+        known = state.known if inputs.move.since >= 0.0 else abs(inputs.reference - place) < SAME
+        joins = known and 0.0 <= inputs.move.since < inputs.move.duration - TO_JOIN
+        state = self._continuing(state, inputs) if joins else state
+        state = state._replace(reference=inputs.reference, known=known, joins=joins)
+        return state, joins or rest.periods >= enough
+
+    def _watched(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the motion off the last rest, by whatever commands it."""
+        law, target = state.regulator, state.plan.at(math.inf)
+        estimate, _ = self._corrected(state, inputs, target, law.watching)
+        return state._replace(estimate=law.A @ estimate)
+
+    def _continuing(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the command that goes on with u as it has been found."""
+        stroke = piston_stroke(inputs.angle, self.parameters.actuator.static)
+        oil = Oil(stroke, inputs.pressure_lifting, inputs.pressure_lowering, state.logic)
+        opening = self.drive.opening(float(state.estimate[state.regulator.flow]), _open(oil))
+        openings = (opening,) * len(state.openings)
+        return state._replace(command=self.drive.command(opening), openings=openings)
+
+    def _joined(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that leads the move under way, another one's, to its end."""
+        p, law, move = self.parameters, state.regulator, inputs.move
+        rest = state.plan.at(math.inf)
+        x, _ = self._corrected(state, inputs, rest, law.watching)
+        boom = p.boom.loaded(state.payload)
+        clamped, modes = boom.clamped(), np.zeros((2, len(boom.joint)))
+        modes[:, : law.modes] = x[: law.modes], x[law.modes : 2 * law.modes]
+        now = UnderWay(
+            time=move.since,
+            angle=rest.angle + float(boom.joint @ modes[0]),
+            rate=float(boom.joint @ modes[1]),
+            shape=boom.sag() * math.cos(rest.angle) + clamped.rigid * rest.angle + modes[0],
+            swinging=modes[1],
+            force=rest.force + state.plan.stiffness * float(x[2 * law.modes] - x[law.force]),
+            velocity=float(x[law.flow]),
+        )
+        _, end = self._off_the_ends(state.rest, (rest.stroke, rest.stroke + move.distance))
+        plan = self.planner.onward(boom, now, end, move.duration - move.since)
+        estimate = np.zeros(len(law.A))
+        estimate[law.force] = x[law.force] * state.plan.stiffness / plan.stiffness
+        return state._replace(
+            plan=plan, estimate=estimate, past=(0.0,) * law.delays, moving=True, joins=False,
+            cut=end != rest.stroke + move.distance, surprise=1.0, loaded=False,
+        )  # fmt: skip
 
     @property
     def _begins(self) -> float:
@@ -373,6 +430,8 @@ class Lqg:
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
         p = self.parameters
+        if state.joins:
+            return self._joined(state, inputs)
         if self._under_way(inputs.move):
             if state.moving:
                 return state
@@ -464,7 +523,7 @@ class Lqg:
         return off_the_ends(min(max(wanted, -p.speed), p.speed), stroke, 0.0, p)
 
     def _corrected(
-        self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
+        self, state: LqgState, inputs: LqgInputs, target: Target, known: Filter
     ) -> tuple[Array, float]:
         """Return x corrected by what is measured, and the mean surprise."""
         law = state.regulator
@@ -476,7 +535,6 @@ class Lqg:
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
         innovation = measured - law.C @ state.estimate
-        known = law.at_rest if arrived else law.moving
         squared = float(innovation @ known.certainty @ innovation) / len(innovation)
         surprise = state.surprise + SURPRISE_SHARE * (squared - state.surprise)
         gain = known.loaded if state.loaded else known.gain

@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
 TO_JOIN = 1.0  # s of a move that have to be left for another one to take over
+TO_CATCH_UP = 0.5  # s after the move's end: who drove before may have been behind
 SAME = 1e-6  # m
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
@@ -336,7 +337,8 @@ class Lqg:
             velocity=float(x[law.flow]),
         )
         _, end = self._off_the_ends(state.rest, (rest.stroke, rest.stroke + move.distance))
-        plan = self.planner.onward(boom, now, end, move.duration - move.since)
+        left = move.duration - move.since + TO_CATCH_UP
+        plan = self.planner.onward(boom, now, end, left)
         estimate = np.zeros(len(law.A))
         estimate[law.force] = x[law.force] * state.plan.stiffness / plan.stiffness
         return state._replace(

@@ -271,7 +271,7 @@ def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
     assert finished.returncode == 0, finished.stderr
     recorded = _read_with_rosbags(bag)
     stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
-    # Of 377: the computer may be busy, and its timer then comes twice in a period; it does not go on.
+    # Of 377: the computer may be busy, its timer then comes twice in a period; it does not go on.
     assert 150 < len(stroke) < 400
     periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
     assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)

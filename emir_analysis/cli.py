@@ -23,7 +23,7 @@ USAGE = """usage: emir COMMAND ...
   limit      the smallest deflection of the TCP that any command could reach for a move
   yardstick  controllers against that limit, over random draws of the machine
   disturb    a push, a load dropped or picked up: what each controller makes of it
-  design     a predictive controller for a machine, and where it is stable
+  design     a controller for a machine, and where it is stable
   linearize  linear design models of the machine, and how good they are
   figures    the paper's figures, drawn by this machine, and a table of its numbers
   diagnose   what a model lacks: the residual of a recording, traced to an effect
@@ -273,7 +273,7 @@ def _design(words: list[str]) -> int:
         "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
         help="YAML of the machine or recording of a run; default: EMIR's joint 1",
     )  # fmt: skip
-    parser.add_argument("--controller", default="pfc", help="pfc (default) or pfc_tip")
+    parser.add_argument("--controller", default="pfc", help="pfc (default), pfc_tip, lqg, mpc")
     parser.add_argument(
         "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
     )
@@ -289,6 +289,10 @@ def _design(words: list[str]) -> int:
     )  # fmt: skip
     parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
+    parser.add_argument(
+        "--oil-tolerance", type=float, default=0.2, metavar="X",
+        help="of lqg and mpc: by how much the oil's stiffness may differ from the stated one",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     print(command(parser.parse_args(words), _progress))

@@ -1,10 +1,11 @@
-"""`emir design`: a predictive controller from a machine's model, as a file that the node loads."""
+"""`emir design`: a controller from a machine's model, as a file that the node loads."""
 
 import math
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
+from emir_analysis import design_lqg
 from emir_analysis.design_pfc import (
     ANGLES,
     ORDERS,
@@ -36,10 +37,15 @@ COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 def command(options: Namespace, progress: Callable[[str], None]) -> str:
     """Design, check, write the file; return what to tell. Raises InputError, ParameterError."""
-    if options.controller not in OUTPUTS:
-        raise ParameterError(f"controller {options.controller!r}: there are {', '.join(OUTPUTS)}")
-    output = OUTPUTS[options.controller]
     recorded = _is_recording(Path(options.machine))
+    if options.controller in design_lqg.CONTROLLERS:
+        if recorded:
+            raise InputError(f"--controller {options.controller}: a machine's YAML is needed")
+        return design_lqg.command(_machine(options.machine), options, progress)
+    if options.controller not in OUTPUTS:
+        known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
+        raise ParameterError(f"controller {options.controller!r}: there are {known}")
+    output = OUTPUTS[options.controller]
     task = DesignTask(
         controller=options.controller,
         order=options.order or (RECORDED_ORDER if recorded else ORDERS[output]),

@@ -202,7 +202,7 @@ def trajectory(
             np.array([math.pi, *(c.angle(of.stroke_high - margin) for c, of in by_number)]),
         ),
         drives=tuple(Actuator(actuator(machine)) for machine in machines(robot, reaches)),
-        supply=Supply(path.supply, robot.pump.flow_max),
+        supply=Supply(path.supply, robot.pump.flow_max, robot.pump.droop),
         move=move,
         line=path.line,
         weigh=bool(path.weigh),

@@ -39,13 +39,19 @@ def _replaced(tree: Any, values: Mapping[str, Any], prefix: str) -> Any:
             quantities(tree)[name].check(prefix + name, value)
             new[name] = type(getattr(tree, name))(value)
         else:
-            raise ParameterError(f"{prefix}{name}: there is no such parameter")
+            raise _unknown(tree, prefix, name)
     known = {field.name for field in dataclasses.fields(tree)}
     for name, rest_of_it in branches.items():
         branch = getattr(tree, name) if name in known else None
         if not dataclasses.is_dataclass(branch):
-            raise ParameterError(
-                f"{prefix}{name}.{next(iter(rest_of_it))}: there is no such parameter"
-            )
+            raise _unknown(tree, prefix, f"{name}.{next(iter(rest_of_it))}")
         new[name] = _replaced(branch, rest_of_it, f"{prefix}{name}.")
     return dataclasses.replace(tree, **new)
+
+
+def _unknown(tree: Any, prefix: str, name: str) -> ParameterError:
+    """Return what says that a name is unknown, and which there are beside it."""
+    known = [prefix + field.name for field in dataclasses.fields(tree)]
+    return ParameterError(
+        f"{prefix}{name}: there is no such parameter; there are {', '.join(known)}"
+    )

@@ -22,15 +22,22 @@ from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
 from emir_control.limits import LimitParameters, off_the_ends
-from emir_control.motion_plan import MotionPlan, Planner, Target, resting
-from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
-from emir_control.regulator import Regulator, RegulatorParameters, regulator
+from emir_control.motion_plan import MotionPlan, Planner, Target, UnderWay, resting
+from emir_control.prefilter import (
+    joint_angle,
+    piston_stroke,
+    piston_velocity,
+)
+from emir_control.regulator import Filter, Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
 
 Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
+TO_JOIN = 1.0  # s of a move that have to be left for another one to take over
+TO_CATCH_UP = 0.5  # s after the move's end: who drove before may have been behind
+SAME = 1e-6  # m
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
 SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
@@ -45,9 +52,12 @@ class FillParameters:
     """
 
     lead: float = quantity("s", 0.0, 30.0, "before the move; 0: no filling", default=7.0)
-    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=3e5)
+    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=1e5)
     rate: float = quantity("1/s", 0.01, 10.0, "speed over way left", default=0.8)
-    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=6e-4)
+    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=1e-3)
+    stopping: float = quantity(
+        "s", 0.032, 10.0, "from the slowest speed; a period of the boom", default=1.5
+    )
     acceleration: float = quantity("m/s^2", 1e-4, 1.0, "of the piston", default=2.5e-3)
     damping: float = quantity("1/s", 0.0, 20.0, "speed by the force's deviation / k_h", default=3.0)
 
@@ -58,6 +68,8 @@ class FillParameters:
         self, filled: "Filled", missing: float, drive: Actuator, stroke: float, dt: float
     ) -> float:
         """Return the speed, m/s, with a pressure, Pa, missing to the aim."""
+        if missing <= 0.0:
+            return max(filled.velocity - self.slowest / self.stopping * dt, 0.0)
         left = missing * drive.compression(stroke)
         wanted = max(self.rate * left, self.slowest)
         return min(wanted, filled.velocity + self.acceleration * dt)
@@ -76,7 +88,7 @@ class LqgParameters:
     regulator: RegulatorParameters = field(default_factory=RegulatorParameters)
     limits: LimitParameters = field(default_factory=LimitParameters)
     softness: float = quantity(
-        "1", 0.1, 2.0, "of the stated k_h: oil softer than taken for does more harm", default=0.83
+        "1", 0.1, 2.0, "of the stated k_h, what is reckoned with; see softness.py", default=0.86
     )
     allowance: float = quantity(
         "1", 0.0, 1.0, "of the plan's deflection over the smallest, for less travel", default=0.03
@@ -115,10 +127,14 @@ class Rest(NamedTuple):
 
 
 class Filled(NamedTuple):
-    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s."""
+    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s.
+
+    over: it has come to its end.
+    """
 
     moved: float
     velocity: float
+    over: bool = False
 
 
 NOT_FILLED = Filled(0.0, 0.0)
@@ -131,7 +147,8 @@ class LqgState(NamedTuple):
     gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
     of the valve of commands that are under way, the newest first. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
-    seems to come or to go. reference: m, of the last period of standing by.
+    seems to come or to go. reference: m, of the last period of standing by. known: it stands by
+    since before the move. joins: it may take over in the move.
     logic: block's opening. command: the last one. moving: a move is under way or about to begin.
     filled: what a filling of the lowering chamber has told.
     """
@@ -152,6 +169,8 @@ class LqgState(NamedTuple):
     surprise: float = 1.0
     loaded: bool = False
     reference: float = math.nan
+    known: bool = False
+    joins: bool = False
 
 
 class LqgInputs(NamedTuple):
@@ -198,6 +217,12 @@ class Lqg:
         p = self.parameters
         return Actuator(p.actuator, p.softness)
 
+    @cached_property
+    def planner(self) -> Planner:
+        """What plans the moves."""
+        p = self.parameters
+        return Planner(self.drive, p.period, self._late, p.allowance)
+
     def initial(self, inputs: LqgInputs) -> LqgState:
         """Return the state of a machine that rests with what is measured now."""
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
@@ -217,13 +242,17 @@ class Lqg:
         state = self._prepared(state, inputs)
         if self._to_fill(state, inputs):
             return self._filling(state, inputs, dt)
-        if (state.moving or state.filled.moved) and inputs.move.since < self._begins:
+        if state.filled.moved and not (state.filled.over or state.moving):
+            state = self._full(state, inputs)
+        waits = state.moving and inputs.move.since < self._begins
+        if waits and not state.filled.moved:
             return self._waiting(state, inputs)
         plan, law = state.plan, state.regulator
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
-        arrived = time >= plan.ends
-        estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
+        arrived = waits or time >= plan.ends
+        known = law.at_rest if arrived else law.moving
+        estimate, surprise = self._corrected(state, inputs, target, known)
         loaded = surprise > (1.0 if state.loaded else SURPRISE)
         state = state._replace(surprise=surprise, loaded=loaded)
         from_plan = plan.velocity(time + self._late, dt)
@@ -256,10 +285,10 @@ class Lqg:
         """Return the next state while another one drives, and whether this one may take over.
 
         It may where the reference has rested for long enough to read the payload, swinging boom or
-        not.
+        not; and in a move that it has watched from the start, with time left.
         """
         if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
-            return state._replace(reference=math.nan), False
+            return state._replace(reference=math.nan, known=False, joins=False), False
         moves = inputs.reference != state.reference or self._under_way(inputs.move)
         enough = STANDING_BY * self._enough
         rest = self._read(state.rest, inputs, 1 if moves else state.rest.periods + 1, enough)
@@ -267,7 +296,55 @@ class Lqg:
         state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
         if rest.periods == enough:
             state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
-        return state._replace(reference=inputs.reference), rest.periods >= enough
+        elif rest.periods < enough:
+            state = self._watched(state, inputs)
+        place = state.plan.at(math.inf).stroke
+        known = state.known if inputs.move.since >= 0.0 else abs(inputs.reference - place) < SAME
+        joins = known and 0.0 <= inputs.move.since < inputs.move.duration - TO_JOIN
+        state = self._continuing(state, inputs) if joins else state
+        state = state._replace(reference=inputs.reference, known=known, joins=joins)
+        return state, joins or rest.periods >= enough
+
+    def _watched(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the motion off the last rest, by whatever commands it."""
+        law, target = state.regulator, state.plan.at(math.inf)
+        estimate, _ = self._corrected(state, inputs, target, law.watching)
+        return state._replace(estimate=law.A @ estimate)
+
+    def _continuing(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the command that goes on with u as it has been found."""
+        stroke = piston_stroke(inputs.angle, self.parameters.actuator.static)
+        oil = Oil(stroke, inputs.pressure_lifting, inputs.pressure_lowering, state.logic)
+        opening = self.drive.opening(float(state.estimate[state.regulator.flow]), _open(oil))
+        openings = (opening,) * len(state.openings)
+        return state._replace(command=self.drive.command(opening), openings=openings)
+
+    def _joined(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that leads the move under way, another one's, to its end."""
+        p, law, move = self.parameters, state.regulator, inputs.move
+        rest = state.plan.at(math.inf)
+        x, _ = self._corrected(state, inputs, rest, law.watching)
+        boom = p.boom.loaded(state.payload)
+        clamped, modes = boom.clamped(), np.zeros((2, len(boom.joint)))
+        modes[:, : law.modes] = x[: law.modes], x[law.modes : 2 * law.modes]
+        now = UnderWay(
+            time=move.since,
+            angle=rest.angle + float(boom.joint @ modes[0]),
+            rate=float(boom.joint @ modes[1]),
+            shape=boom.sag() * math.cos(rest.angle) + clamped.rigid * rest.angle + modes[0],
+            swinging=modes[1],
+            force=rest.force + state.plan.stiffness * float(x[2 * law.modes] - x[law.force]),
+            velocity=float(x[law.flow]),
+        )
+        _, end = self._off_the_ends(state.rest, (rest.stroke, rest.stroke + move.distance))
+        left = move.duration - move.since + TO_CATCH_UP
+        plan = self.planner.onward(boom, now, end, left)
+        estimate = np.zeros(len(law.A))
+        estimate[law.force] = x[law.force] * state.plan.stiffness / plan.stiffness
+        return state._replace(
+            plan=plan, estimate=estimate, past=(0.0,) * law.delays, moving=True, joins=False,
+            cut=end != rest.stroke + move.distance, surprise=1.0, loaded=False,
+        )  # fmt: skip
 
     @property
     def _begins(self) -> float:
@@ -294,17 +371,17 @@ class Lqg:
         """Return the shut valve of a move that is planned and has not begun."""
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
         outputs = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
-        filled = state.filled._replace(velocity=0.0)
-        return state._replace(command=0.0, logic=logic, filled=filled), outputs
+        return state._replace(command=0.0, logic=logic), outputs
 
     def _to_fill(self, state: LqgState, inputs: LqgInputs) -> bool:
         """Tell whether the lowering chamber has to be filled before the move that comes."""
         move, fill = inputs.move, self.parameters.fill
         if state.moving or move.distance >= 0.0 or not -fill.lead <= move.since < 0.0:
             return False
-        if state.filled.moved and not state.filled.velocity:
-            return False  # it has been full already
-        return inputs.pressure_lifting < self.parameters.actuator.threshold + fill.margin
+        if state.filled.over:
+            return False
+        missing = self.parameters.actuator.threshold + fill.margin - inputs.pressure_lifting
+        return missing > 0.0 or state.filled.velocity > 0.0
 
     def _filling(
         self, state: LqgState, inputs: LqgInputs, dt: float
@@ -316,7 +393,9 @@ class Lqg:
         missing = p.threshold + self.parameters.fill.margin - inputs.pressure_lifting
         velocity = self.parameters.fill.velocity(state.filled, missing, drive, stroke, dt)
         force = drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
-        pushed = (force - state.rest.force) / drive.stiffness(stroke)
+        before = joint_angle(inputs.reference, self.parameters.actuator.static)
+        heavier = self._weight(inputs.angle) / self._weight(before)
+        pushed = (force - heavier * state.rest.force) / drive.stiffness(stroke)
         given = max(velocity + self.parameters.fill.damping * pushed, 0.0)
         opening = drive.opening(-given, oil)
         command = drive.command(opening) - (0.5 * self.parameters.hysteresis if given else 0.0)
@@ -328,12 +407,38 @@ class Lqg:
         after = state._replace(command=command, logic=logic, filled=filled, rest=rest)
         return after, outputs
 
+    def _weight(self, angle: float) -> float:
+        """Return the force at rest at an angle, rad, over the torque of the level boom, 1/m."""
+        return math.cos(angle) / piston_velocity(1.0, angle, self.parameters.actuator.static)
+
+    def _full(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that rests where the filling has ended: the boom swings from it."""
+        rest = state.rest._replace(angle=inputs.angle)
+        filled = state.filled._replace(over=True)
+        here = inputs._replace(move=NO_MOVE)
+        return self._begin(rest, here, state.logic, state.command, filled)
+
+    def _onward(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state at the start of a move from where the chamber was filled.
+
+        What is known of the swing and of what is under way stays known.
+        """
+        rest = state.rest._replace(angle=float(state.plan.angle[-1]))
+        begun = self._begin(rest, inputs, state.logic, state.command, state.filled)
+        return begun._replace(
+            estimate=state.estimate, past=state.past, openings=state.openings, rest=state.rest
+        )
+
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
         p = self.parameters
+        if state.joins:
+            return self._joined(state, inputs)
         if self._under_way(inputs.move):
             if state.moving:
                 return state
+            if state.filled.over:
+                return self._onward(state, inputs)
             return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
         last = state.rest
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
@@ -368,9 +473,7 @@ class Lqg:
 
     def _payload(self, force: float, angle: float) -> float:
         """Return the payload, kg, that a force at rest, N, holds at an angle of the joint, rad."""
-        linkage = self.parameters.actuator.static
-        torque = force * piston_velocity(1.0, angle, linkage) / math.cos(angle)
-        return self.parameters.boom.payload(torque)
+        return self.parameters.boom.payload(force / self._weight(angle))
 
     def _begin(
         self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
@@ -381,9 +484,9 @@ class Lqg:
         ends = inputs.reference, inputs.reference + move.distance
         start, end = here, _ = self._off_the_ends(rest, ends)
         cut = (start, end) != ends
-        if move.distance and filled.moved:
+        if filled.moved:
             start = piston_stroke(rest.angle, linkage)
-        move = move._replace(distance=end - start)
+        move = move._replace(distance=end - start if move.distance else 0.0)
         angle = joint_angle(here, linkage)
         payload = self._payload(rest.force, angle)
         boom = p.boom.loaded(payload)
@@ -401,8 +504,7 @@ class Lqg:
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
             return resting(boom, self.drive, start)
-        p = self.parameters
-        return Planner(self.drive, p.period, self._late, p.allowance).plan(boom, start, move)
+        return self.planner.plan(boom, start, move)
 
     def _off_the_ends(self, rest: Rest, ends: tuple[float, float]) -> tuple[float, float]:
         """Return start and end of a move, m, kept off the ends of the stroke.
@@ -423,7 +525,7 @@ class Lqg:
         return off_the_ends(min(max(wanted, -p.speed), p.speed), stroke, 0.0, p)
 
     def _corrected(
-        self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
+        self, state: LqgState, inputs: LqgInputs, target: Target, known: Filter
     ) -> tuple[Array, float]:
         """Return x corrected by what is measured, and the mean surprise."""
         law = state.regulator
@@ -435,7 +537,6 @@ class Lqg:
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
         innovation = measured - law.C @ state.estimate
-        known = law.at_rest if arrived else law.moving
         squared = float(innovation @ known.certainty @ innovation) / len(innovation)
         surprise = state.surprise + SURPRISE_SHARE * (squared - state.surprise)
         gain = known.loaded if state.loaded else known.gain
@@ -443,16 +544,10 @@ class Lqg:
 
     def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
         """Return u off the plan, m/s."""
-        law = state.regulator
-        return -float(estimate[law.flow]) - float(law.feedback @ self._off(state, estimate))
+        return state.regulator.command(estimate, np.array(state.past))
 
     def _off(self, state: LqgState, estimate: Array) -> Array:
-        """Return what the feedback acts on: (q, q', s - f, past u + d)."""
-        law = state.regulator
-        off = np.append(estimate[: law.controlled], np.array(state.past) + estimate[law.flow])
-        off[law.controlled - 1] -= estimate[law.force]
-        off[: law.controlled] -= law.held * estimate[law.load]
-        return off
+        return state.regulator.off(estimate, np.array(state.past))
 
     def _resting(self, law: Regulator, estimate: Array, wanted: float, *, arrived: bool) -> bool:
         """Tell whether the valve stays shut."""

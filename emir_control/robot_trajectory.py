@@ -4,7 +4,7 @@ Either is a path, the same for way and way back, and a trapezoidal velocity alon
 where the joints are measured to be.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -74,8 +74,9 @@ class Linkage(Protocol):
 class Supply(NamedTuple):
     """The pump that feeds all drives."""
 
-    pressure: float  # Pa
-    flow: float  # m^3/s
+    pressure: float  # set, Pa
+    flow: float  # largest, m^3/s
+    droop: float  # by which the pressure is below the set one at the largest flow, Pa
 
 
 class RobotReference(NamedTuple):
@@ -257,25 +258,27 @@ class RobotTrajectory:
                     f" its valve gives {drive.fastest * factor:.3g}"
                 )
         velocities = np.concatenate((velocities, -velocities))  # the way back takes other forces
-        most, name = max(
-            (drive.supply_needed(float(force), float(velocity)), name)
-            for name, drive, *columns in zip(
-                JOINTS, self.drives, np.tile(forces, (2, 1)).T, velocities.T, strict=True
-            )
-            for force, velocity in zip(*columns, strict=True)
-        )
-        if most > self.supply.pressure:
+        forces = np.tile(forces, (2, 1))
+        flows = _each(Actuator.pumped, self.drives, velocities).sum(axis=1)
+        if flows.max() > self.supply.flow:
             raise ReachError(
-                f"with {self.arm.parameters.payload:.0f} kg {name} would need {most / BAR:.0f} bar,"
-                f" the pump gives {self.supply.pressure / BAR:.0f}"
-            )
-        flows = [[d.pumped(v) for d, v in zip(self.drives, row, strict=True)] for row in velocities]
-        flow = max(map(sum, flows))
-        if flow > self.supply.flow:
-            raise ReachError(
-                f"the joints together would need {flow / LITRE:.0f} l/min,"
+                f"the joints together would need {flows.max() / LITRE:.0f} l/min,"
                 f" the pump gives {self.supply.flow / LITRE:.0f}"
             )
+        needed = _each(Actuator.supply_needed, self.drives, forces, velocities)
+        given = self.supply.pressure - self.supply.droop * flows / self.supply.flow
+        row, k = np.unravel_index(np.argmax(needed - given[:, np.newaxis]), needed.shape)
+        if needed[row, k] > given[row]:
+            raise ReachError(
+                f"with {self.arm.parameters.payload:.0f} kg {JOINTS[k]} would need"
+                f" {needed[row, k] / BAR:.0f} bar, the pump gives {given[row] / BAR:.0f}"
+            )
+
+
+def _each(value: Callable[..., float], drives: Sequence[Actuator], *columns: Array) -> Array:
+    """Return a value of each drive in each row, (n, 6), of the columns' numbers, (n, 6) each."""
+    rows = zip(*columns, strict=True)
+    return np.array([[value(*of) for of in zip(drives, *row, strict=True)] for row in rows])
 
 
 def _forces(arm: Arm, linkages: Sequence[Linkage], ways: Array, joints: Array) -> CubicSpline:

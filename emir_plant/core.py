@@ -109,7 +109,7 @@ def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
 def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
     """Return dx/dt of the integrated model (paper Fig. 6) with a command at the valve.
 
-    That is the command y2 behind the delay line, on which only time and `advance` work.
+    That is the command y2 behind the delay line, on which only time and `_advance` work.
     """
     dx = np.zeros_like(x)
     write_derivative(x, command, parameters, dx)

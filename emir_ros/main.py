@@ -5,13 +5,16 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
 import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
@@ -22,12 +25,13 @@ try:
 except ImportError:  # an older Jazzy: everything works, but slower
     EventsExecutor = SingleThreadedExecutor
 
+LOOK_PERIOD = 0.1  # s, between two looks at whether to stop
 QUIET = 0.2  # s without a message, after which all that was sent counts as received
 LONGEST_REST = 5.0  # s that is waited for that
 
 
 class StopRequest:
-    """SIGINT or SIGTERM, taken note of; the loop that spins looks at it between two callbacks.
+    """SIGINT or SIGTERM, taken note of; whoever spins looks at it from time to time.
 
     rclpy's own handlers would shut the context down under a callback that is publishing.
     """
@@ -49,7 +53,7 @@ def start_ros() -> StopRequest:
 
 @contextmanager
 def make_executor() -> Iterator[Any]:
-    """Give the executor to spin with `spin_once`: the newer one, which has less to do per message.
+    """Give the newer executor, which has less to do per message.
 
     It is shut down before the nodes and the context are: left over, it may complain at exit.
     """
@@ -69,11 +73,35 @@ def keep_out_of_garbage_collection() -> None:
     gc.freeze()
 
 
+def spin(executor: Any, node: Shell, ended: Future, stop: StopRequest) -> None:
+    """Spin until a node has ended; node: any of them, for a timer.
+
+    Not message by message: entering and leaving the executor takes longer than many a callback.
+    While messages keep coming it does not leave in time by itself, so a timer ends it; and it
+    cannot be entered without a time: then it hangs. Raises KeyboardInterrupt when the process is
+    told to stop.
+    """
+
+    def look() -> None:  # not the signal's handler: it may interrupt who holds the future's lock
+        if stop.made and not ended.done():
+            ended.set_result(None)
+
+    timer = node.create_timer(LOOK_PERIOD, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    while not ended.done():
+        executor.spin_until_future_complete(ended, timeout_sec=LOOK_PERIOD)
+    node.destroy_timer(timer)
+    if stop.made:
+        raise KeyboardInterrupt
+
+
 def take_the_rest(executor: Any, *nodes: Shell) -> None:
-    """Let nodes that hear everybody take what has arrived, until nothing more comes."""
+    """Let nodes that hear everybody take what has arrived; the others are over."""
     hearing = [node for node in nodes if node.hears_everybody]
     if not hearing:
         return
+    for node in nodes:
+        if node not in hearing:
+            executor.remove_node(node)
     heard, end = -1, time.monotonic() + LONGEST_REST
     while time.monotonic() < end and sum(node.heard for node in hearing) > heard:
         heard = sum(node.heard for node in hearing)
@@ -98,9 +126,9 @@ def _run(node_class: Callable[[], Shell]) -> int:
         with make_executor() as executor:
             executor.add_node(node)
             keep_out_of_garbage_collection()
-            while not (stop.made or node.done):
-                executor.spin_once(timeout_sec=0.1)
-                node.check()
+            with suppress(KeyboardInterrupt):
+                spin(executor, node, node.ended, stop)
+            node.check()
             take_the_rest(executor, node)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0

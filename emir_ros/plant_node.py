@@ -131,7 +131,7 @@ class PlantNode(Shell):
         if self._recorder and self._recorded < now - now % CONTROL_PERIOD_NS:
             return
         if self._is_over():
-            self.done = True
+            self.end()
             return
         fast = self._valves.every == "plant"
         for _ in range(1 if fast else CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
@@ -160,7 +160,7 @@ class PlantNode(Shell):
         self.diagnostics.figures = self._figures
         self._compile()
         self._publish_sensors(self.get_clock().now().nanoseconds)
-        self._started = time.monotonic()
+        self._started: float | None = None
         self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
 
     def _compile(self) -> None:
@@ -174,7 +174,7 @@ class PlantNode(Shell):
         return self._beat.values() | pressures(self.machine.signals(self.tick))
 
     def _on_timer(self) -> None:
-        if not self.active:  # time stands still
+        if self._started is None or not self.active:  # time stands still
             self._started = time.monotonic() - self.tick * PLANT_PERIOD_NS * 1e-9
             return
         self._beat.tick(self.seconds())
@@ -191,7 +191,8 @@ class PlantNode(Shell):
             self._step(command)
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self._show_progress()
-        self.done = self._is_over()
+        if self._is_over():
+            self.end()
 
     def _fresh_command(self) -> Signals:
         if self._command is None:

@@ -151,7 +151,8 @@ class ReplayNode(Shell):
             sent[self._next.topic] += 1
             self._by_topic[self._next.topic].publish(self._next.data)
             self._next = next(self._messages, None)
-        self.done = self._next is None
+        if self._next is None:
+            self.end()
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
+from rclpy.task import Future
 
 from emir_analysis.errors import InputError
 from emir_analysis.run_report import analyze, text
@@ -20,11 +21,7 @@ from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
-from emir_ros.main import (
-    make_executor,
-    start_ros,
-    take_the_rest,
-)
+from emir_ros.main import make_executor, spin, start_ros, take_the_rest
 from emir_ros.shell import NodeError, Shell
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
@@ -110,18 +107,16 @@ def run_plan(plan: Plan, processes: str) -> int:
 def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
     stop = start_ros()
     nodes: dict[str, Shell] = {}
+    ended = Future()
     try:
         with make_executor() as executor:
             for name in plan.nodes:
                 nodes[name] = _node_class(name)(ros)
+                nodes[name].ended.add_done_callback(lambda _: ended.set_result(None))
                 executor.add_node(nodes[name])
-            plant = nodes["plant_node"]
-            while not plant.done:
-                if stop.made:
-                    raise KeyboardInterrupt
-                executor.spin_once(timeout_sec=0.1)
-                for node in nodes.values():
-                    node.check()
+            spin(executor, nodes["plant_node"], ended, stop)
+            for node in nodes.values():
+                node.check()
             take_the_rest(executor, *nodes.values())
     finally:
         for node in nodes.values():

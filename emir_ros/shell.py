@@ -15,6 +15,7 @@ from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.task import Future
 
 from emir_analysis.node_controls import NodeControl, Stepping
 from emir_analysis.switching import Ready
@@ -71,9 +72,9 @@ class Shell(LifecycleNode):
         robot: Sequence[Topic] | None = None,
     ) -> None:
         self.failure: NodeError | ParameterError | SimulationError | None = None
+        self.ended = Future()  # complete when the node is done or has failed
         self.active = False
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
-        self.done = False
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
         known = {JOINT1: outputs} | ({} if robot is None else {ROBOT: robot})
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
@@ -176,9 +177,20 @@ class Shell(LifecycleNode):
             callback(*args)
         except (NodeError, ParameterError, SimulationError) as error:
             self.failure = self.failure or error
+            self.end()
+
+    @property
+    def done(self) -> bool:
+        """Return whether the node has nothing more to do."""
+        return bool(self.ended.done())
+
+    def end(self) -> None:
+        """Let whoever spins the node stop."""
+        if not self.done:
+            self.ended.set_result(None)
 
     def check(self) -> None:
-        """Raise what a callback failed with, if one did: whoever spins the node calls this."""
+        """Raise what a callback failed with, if one did: who has spun the node calls this."""
         if self.failure is not None:
             raise self.failure
 

@@ -42,18 +42,21 @@ H, S, DEFLECTION = "pressure_lifting", "pressure_lowering", "tip_deflection_angl
 
 
 class Balance(NamedTuple):
-    """What a residual is measured in and which signals it takes beside the command."""
+    """What a residual is measured in and which signals it takes.
+
+    Beside the command and the boom's motion, which angle or stroke shows.
+    """
 
     unit: str
     signals: frozenset[str]
 
 
 BALANCES = {
-    "force": Balance("N", frozenset({ANGLE, H, S})),
-    "lifting_chamber": Balance("m^3/s", frozenset({ANGLE, H})),
-    "lowering_chamber": Balance("m^3/s", frozenset({ANGLE, S})),
+    "force": Balance("N", frozenset({H, S})),
+    "lifting_chamber": Balance("m^3/s", frozenset({H})),
+    "lowering_chamber": Balance("m^3/s", frozenset({S})),
     "linkage": Balance("m", frozenset({ANGLE, STROKE})),
-    "bending": Balance("rad", frozenset({ANGLE, H, S, DEFLECTION})),
+    "bending": Balance("rad", frozenset({H, S, DEFLECTION})),
 }
 LINKAGE = list(BALANCES).index("linkage")
 
@@ -115,7 +118,7 @@ class Balances:
         found = {
             name: (unit, experiment.outputs[:, k])
             for k, (name, unit) in enumerate(OUTPUTS.items())
-            if name in experiment.measured
+            if not np.isnan(experiment.outputs[0, k])
         }
         found["piston_velocity"] = ("m/s", self.velocity)
         if {H, S} <= experiment.measured:

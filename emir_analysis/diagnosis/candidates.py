@@ -82,7 +82,12 @@ def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) ->
 
 
 def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
-    """Fit a trial to the balances of recordings. floor: (5,) what the sensors leave in each."""
+    """Fit a trial to the balances of recordings. floor: (5,) what the sensors leave in each.
+
+    Nothing is fitted of a machine without tolerances and effects.
+    """
+    if not start.x.size:
+        return start
 
     def model(points: Array) -> Array:
         missing = evidence.residuals([start.unknowns.at(x) for x in points])
@@ -249,12 +254,21 @@ def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
     return found
 
 
-def coarse_errors(machines: Sequence[Machine], evidence: Evidence) -> Array:
-    """Return errors in units of the noise, (m, n), of coarse free runs of all recordings."""
-    middle = np.zeros((len(machines), 2))
+def coarse_errors(
+    machines: Sequence[Machine],
+    evidence: Evidence,
+    starts: Sequence[tuple[float, float]] | None = None,
+) -> Array:
+    """Return errors in units of the noise, (m, n), of coarse free runs of all recordings.
+
+    starts: angle, rad, and p_S, Pa, at rest in each recording; as the sensors show when not given.
+    """
+    if starts is None:
+        middle = np.zeros((1, 2))
+        starts = [Starts(e, evidence).at(middle)[0] for e in evidence.experiments]
     errors = [
-        _free_run_errors(machines, e, evidence, Starts(e, evidence).at(middle), coarse=True)
-        for e in evidence.experiments
+        _free_run_errors(machines, e, evidence, [start] * len(machines), coarse=True)
+        for e, start in zip(evidence.experiments, starts, strict=True)
     ]
     return np.concatenate(errors, axis=1)
 

@@ -40,8 +40,6 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     """
     _check_outputs([json, html, model_out], predictions)
     sheet = load_sheet(datasheet)
-    if not sheet.tolerances:
-        raise InputError(f"{datasheet}: no parameter has a tolerance, nothing to fit")
     judges = _several(judge)
     missing = [path for path in judges if not path.exists()]
     if missing:

@@ -1,12 +1,13 @@
 """The course of a diagnosis: balances, parameters, effects, verdict - from recordings."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import (
+    HOPELESS,
     Trial,
     fit_balances,
     fit_free_run,
@@ -33,6 +34,7 @@ from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
+LEFT = 1.05  # the same of effects, after the last fit, from which on a further one is looked for
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
@@ -85,8 +87,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     search = _Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
-    progress("fitting to the whole recording")
-    final = refine_free_run(chosen, evidence) if chosen.effects else refitted
+    final = search.whole(chosen) if chosen.effects else refitted
     machines = [sheet.machine, search.balanced.machine]
     before, unaided = evidence.residuals(machines)
     after = unaided
@@ -130,6 +131,7 @@ class _Search:
         self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
         self.refitted = fit_free_run(self.balanced, evidence)
         self.tried: list[Tried] = []
+        self._whole: dict[tuple[str, ...], Trial] = {}
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
@@ -138,8 +140,11 @@ class _Search:
         if np.all(at_noise) and quiet(self._left(self.balanced), self.floor):
             self.tried = [self._scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
-        plain = fit_balances(self.balanced, self._head, self.floor)
-        best = self._scored(plain, free_run_score(self.refitted, self._evidence))
+        plain = self._scored(
+            fit_balances(self.balanced, self._head, self.floor),
+            free_run_score(self.refitted, self._evidence),
+        )
+        best = plain
         self.tried, equal, enough = [best], [best.trial], False
         while len(best.trial.effects) < MOST_EFFECTS:
             self._progress(f"all effects beside: {best.trial.name}")
@@ -147,17 +152,45 @@ class _Search:
             if not better:
                 break
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
-            best = min(better, key=_free)
+            best = self._known_whole(min(better, key=_free))
             enough = self._enough(best.trial)
-            if enough and self._excess(best.trial) <= AT_NOISE**2 - 1.0:
+            if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
         if not enough and np.any(self._evidence.fitted):
             self._progress("pairs of effects")
-            found = screen_pairs(plain, self._sheet, self._head, self.floor)
-            better = self._better(self._on_balances(found, best), best)
+            better = self._better(self._on_balances(self._pairs(plain, best), best), best)
             if better:
                 equal = rivals([t.trial for t in better], [_free(t) for t in better])
         return equal
+
+    def whole(self, chosen: Trial) -> Trial:
+        """Return a trial fitted to the free run of the whole recordings."""
+        if chosen.effects not in self._whole:
+            self._progress(f"fitting to the whole recording: {chosen.name}")
+            self._whole[chosen.effects] = refine_free_run(chosen, self._evidence)
+        return self._whole[chosen.effects]
+
+    def _known_whole(self, best: Tried) -> Tried:
+        """Return a trial as the whole recordings have it, if it is near them.
+
+        What the part that the fits see tells badly, such as how a drift goes on, is then no
+        reason to look for another effect.
+        """
+        near = self._excess(best.trial) < HOPELESS**2
+        return replace(best, trial=self.whole(best.trial)) if near else best
+
+    def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
+        """Return pairs of effects, the most promising first.
+
+        All to first order, and all beside the one effect that says most to the balances: the
+        free run may be none the better for it while another effect drives it away.
+        """
+        found = screen_pairs(plain.trial, self._sheet, self._head, self.floor)
+        singles = [t for t in self.tried if len(t.trial.effects) == 1]
+        first = min(singles, key=lambda t: t.balances, default=best)
+        if first.trial.effects != best.trial.effects:
+            found += screen(first.trial, self._sheet, self._head, self.floor)
+        return sorted(found, key=lambda s: s.cost)
 
     def _beside(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more.
@@ -178,7 +211,8 @@ class _Search:
         """
         least = 0.5 * self._excess(best.trial)
         better = self._better(self._on_free_run(best), best)
-        return [t for t in better if self._excess(t.trial) < least]
+        close = min(map(_free, better), default=0.0) + STRONG
+        return [t for t in better if _free(t) < close and self._excess(self.whole(t.trial)) < least]
 
     def _on_free_run(self, best: Tried) -> list[Tried]:
         """Return the trials with one effect more that promise most on the free run."""
@@ -188,7 +222,11 @@ class _Search:
     def _on_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
         """Fit trials to the balances; return those that come close to the best of them."""
         known = {frozenset(tried.trial.effects) for tried in self.tried}
-        new = [s.trial for s in found if frozenset(s.trial.effects) not in known]
+        new = []
+        for screened in found:
+            if frozenset(screened.trial.effects) not in known:
+                known.add(frozenset(screened.trial.effects))
+                new.append(screened.trial)
         round_ = []
         for trial_ in new[:MOST_FITTED]:
             self._progress(f"balances: {trial_.name}")

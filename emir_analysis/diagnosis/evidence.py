@@ -13,7 +13,7 @@ from emir_analysis.diagnosis.balances import (
     level,
     noise_floor,
 )
-from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, noise
+from emir_analysis.diagnosis.experiment import OUTPUTS, STROKE, Experiment, noise
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -23,7 +23,7 @@ class Evidence:
     """Recordings of one machine, which stands in the data sheet as `stated`.
 
     experiments: all with the same signals. sensors: (4,) the outputs' noise, NaN where an output
-    is not measured. told: (5,) which balances the signals allow; fitted: (5,) which of them hold
+    is not known. told: (5,) which balances the signals allow; fitted: (5,) which of them hold
     something that parameters could change.
     """
 
@@ -31,7 +31,7 @@ class Evidence:
         self.experiments = tuple(experiments)
         self.stated = stated
         self.measured = frozenset.intersection(*(e.measured for e in self.experiments))
-        shown = np.array([name in self.measured for name in OUTPUTS])
+        shown = np.array([name in self.measured or name == STROKE for name in OUTPUTS])
         self.sensors = np.where(shown, noise(stated), np.nan)
         self.shown = shown
         self.told = available(self.measured)

@@ -37,8 +37,8 @@ class Experiment:
 
     period: s, between samples. commands: (k,) y2 every COMMAND_STEP. angle: (n,) rad.
     outputs: (n, 4) in the order of OUTPUTS, SI units, NaN where there is no sensor. rest: samples
-    at rest at the start. measured: names of the signals that sensors show; an angle that none
-    shows is the stroke's.
+    at rest at the start. measured: names of the signals that sensors show; of angle and stroke
+    the one that none shows is computed from the other.
     """
 
     name: str
@@ -80,8 +80,8 @@ class Experiment:
 
     def showing(self, angle: Array, outputs: Array) -> "Experiment":
         """Return the recording with other readings of the same sensors."""
-        blind = np.array([name not in self.measured for name in OUTPUTS])
-        return replace(self, angle=angle, outputs=np.where(blind, np.nan, outputs))
+        outputs = np.where(np.isnan(self.outputs[0]), np.nan, outputs)
+        return replace(self, angle=angle, outputs=outputs)
 
     def under(self, commands: Array) -> "Experiment":
         """Return a run from the same rest under other commands, (k,), without readings."""
@@ -139,21 +139,27 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
     commands = _held(recording[COMMAND], begin, every * (time.size - 1))
     rest = _rest(name, commands, period, machine)
+    measured = frozenset(shown)
     angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)
+    if STROKE not in shown:
+        shown[STROKE] = _strokes(angle, machine)
     check_motion(name, angle, machine)
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
-    measured = frozenset(shown) | {ANGLE}
     return Experiment(name, period, commands, angle, outputs, rest, measured)
 
 
 def _angles(stroke: Array, machine: Machine) -> Array:
     """Return the boom angles, (n,) rad, of strokes, (n,) m."""
+    angle = np.linspace(0.0, math.pi, 2000) - machine.geometry.triangle_gamma0
+    return np.asarray(np.interp(stroke, _strokes(angle, machine), angle))
+
+
+def _strokes(angle: Array, machine: Machine) -> Array:
+    """Return the strokes, (n,) m, at boom angles, (n,) rad."""
     p = record(machine)[0]
-    angle = np.linspace(0.0, math.pi, 2000) - p["triangle_gamma0"]
-    strokes = np.array([linkage.stroke(a, p) for a in angle])
-    return np.asarray(np.interp(stroke, strokes, angle))
+    return np.array([linkage.stroke(a, p) for a in angle])
 
 
 def noise(machine: Machine) -> Array:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, coarse_errors, trial
+from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.unknowns import Unknown
@@ -21,8 +22,9 @@ from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
-STARTS = (1.0, -1.0, 4.0, -4.0)  # times the trial sizes, from the best of which a fit starts
+STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
+SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 FASTEST_SWING = 0.5  # Hz: faster ones average out over the windows of the force balance
 FREQUENCIES = 4  # of a swinging load that are tried in a bandwidth of 1 / duration
@@ -102,9 +104,26 @@ class _Candidate:
         own = fit(problem, ACCURACY, robust=True).x if np.isfinite(self.expected) else self.x
         return Screened(self._with_parameters(own), _soft(self._model(own[None])[0]))
 
-    def stepped(self) -> Screened:
-        """Return the fields where they are best to first order."""
-        return Screened(self._with_parameters(self._reached), self.expected)
+    def stepped(self, missing: Missing) -> Screened:
+        """Return the trial where it is best on the way to what is best to first order.
+
+        missing: trials -> (m, n), what they leave with their own parameters.
+        """
+        goal = self._with_parameters(self._reached)
+        low, high = self._start.unknowns.bounds
+        off = self._start.x.copy()  # the effects' shapes as in the goal, their sizes 0
+        off[self._known :] = self._reached
+        off[self._sizes()] = 0.0
+        ways = [self._start.at(np.clip(off + s * (goal.x - off), low, high)) for s in SHARES]
+        costs = [_soft(row) for row in missing(ways)]
+        best = int(np.argmin(costs))
+        return Screened(ways[best], costs[best])
+
+    def _sizes(self) -> NDArray[np.bool_]:
+        """Tell which unknowns are sizes of the further effects, (n,)."""
+        names = [u.path.split(".") for u in self._start.unknowns.members[self._known :]]
+        sizes = [name in REGISTRY[effect].sizes for _, effect, name in names]
+        return np.array([False] * self._known + sizes)
 
     def _with_parameters(self, own: Array) -> Trial:
         """Return the trial with fields, (k,), and the known parameters' best change."""
@@ -147,15 +166,17 @@ def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -
 def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:
     """Return the known trial with each further effect of the registry, the best first.
 
-    By the free run, to first order: for a known trial whose balances are quiet.
+    By the free run, for a known trial whose balances are quiet: the step that is best to first
+    order promises too much far from there, so it is simulated, and shorter ones too.
     """
+    starts = [at_rest(known.machine, e, evidence) for e in evidence.experiments]
 
     def missing(trials: list[Trial]) -> Array:
-        return coarse_errors([t.machine for t in trials], evidence)
+        return coarse_errors([t.machine for t in trials], evidence, starts)
 
     left = _Left(known, missing, SLOPE_STEP)
     begun = _begun(known, sheet, evidence, left, SMALL)
-    return sorted((c.stepped() for c in begun), key=lambda s: s.cost)
+    return sorted((c.stepped(missing) for c in begun), key=lambda s: s.cost)
 
 
 def _in_balances(evidence: Evidence, floor: Array) -> Missing:

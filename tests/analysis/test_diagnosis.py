@@ -88,7 +88,7 @@ def with_stroke_alone(folder: Path, bags_: Path) -> None:
         lambda _: None,
     )
     assert result.verdict == "nothing_missing", summary(result)
-    assert set(result.untold) == {*BALANCES} - {"linkage"}
+    assert set(result.untold) == {*BALANCES}
     assert result.signals["piston_stroke"].refitted < 1.5 * result.signals["piston_stroke"].noise
 
 

@@ -9,6 +9,8 @@ import pytest
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.compare import Run, dynamic_deflection
 from emir_analysis.disturbance import LoadChange
+from emir_analysis.limit import PAPER_MOVE, least
+from emir_analysis.limit import Move as PaperMove
 from emir_analysis.machine_model import actuator, lqg_parameters
 from emir_analysis.node_controls import LqgControl
 from emir_common.parameter_tree import with_values
@@ -58,26 +60,32 @@ def _spectral_radius(law: Regulator, real: Regulator, stiffness: float) -> float
         measured = real.C[:, :m] @ x
         measured[2] *= stiffness
         estimate = estimate + law.moving.gain @ (measured - law.C @ estimate)
-        off = np.append(estimate[: law.controlled], u_past + estimate[law.flow])
-        off[law.controlled - 1] -= estimate[law.force]
-        u = -estimate[law.flow] - law.feedback @ off
+        u = law.command(estimate, u_past)
         given = np.append(u, u_past)
         ahead = real.A[:m, :m] @ x + real.B[:m] @ given
         columns.append(np.concatenate([ahead, given[:-1], law.A @ estimate + law.B @ given]))
     return float(max(abs(np.linalg.eigvals(np.array(columns).T))))
 
 
-def test_lowering_chamber_is_filled_where_the_block_is_shut() -> None:
-    """At 72 deg, empty, a block of 80 bar is shut; it is open when the move starts."""
-    machine = with_values(joint1(), {"logic_block.threshold": 80e5, "supply.p0": 3.2e7})
-    law = Lqg(replace(lqg_parameters(joint1()), actuator=actuator(machine)))
+@pytest.mark.parametrize("stiffer", [0.9, 1.17])
+def test_lowering_chamber_is_filled_where_the_block_is_shut(stiffer: float) -> None:
+    """At 72 deg, empty, a block of 80 bar is shut; it is open when the move starts.
+
+    Without friction the boom swings from the filling; the move takes that into account.
+    """
+    values = {"logic_block.threshold": 80e5, "supply.p0": 3.2e7}
+    oil = {"cylinder.beta": stiffer * joint1().cylinder.beta}
+    machine = with_values(joint1(), values | oil)
+    known = actuator(with_values(joint1(), values))
+    law = Lqg(replace(lqg_parameters(joint1()), actuator=known))
     signals = _run(machine, law, "lower-lift", math.radians(72.0), 8.0, 12.5)
     start = round(8.0 / 0.008)
     assert signals["logic_block"][0] == 0.0
     assert signals["logic_block"][start] > 0.95
+    limit = least(machine, PaperMove(math.radians(72.0), -PAPER_MOVE.distance, 3.3))
     bending = abs(dynamic_deflection(signals))
     assert bending[:start].max() < 0.01
-    assert bending[start:].max() < 0.024
+    assert bending[start:].max() < 1.35 * limit.largest
     error = signals["true_stroke"][-1] - signals["reference_stroke"][-1]
     assert abs(error) < 2e-3
 

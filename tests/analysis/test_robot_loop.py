@@ -206,7 +206,7 @@ def test_sensors_are_quantised_noisy_and_repeatable() -> None:
         ({"line.speed": 2.0}, r"line: joint1 would have to move at \d+ mm/s, its valve gives 54.1"),
         (
             {"arm.payload": 1500.0},
-            r"line: with 1500 kg joint4 would need 3\d\d bar, the pump gives 2",
+            r"line: with 1500 kg joint4 would need 3\d\d bar, the pump gives 19\d",
         ),
     ],
 )
@@ -222,3 +222,13 @@ def test_line_that_takes_more_than_the_shared_pump_gives_is_refused() -> None:
     small = with_values(ROBOT, {"pump.flow_max": 1e-3})
     with pytest.raises(PostureError.__base__, match=r"together .* l/min, the pump gives 60"):
         trajectory(small, "line", MOVE, PATH).initial(RobotTrajectoryInputs(START))
+
+
+def test_pump_that_droops_under_its_flow_gives_less_pressure() -> None:
+    """All joints at once draw what leaves too little for the one with the largest load."""
+    weak = with_values(ROBOT, {"pump.droop": 1e7, "pump.flow_max": 3e-3})
+    with pytest.raises(
+        PostureError.__base__, match=r"joint\d would need 1\d\d bar, the pump gives"
+    ):
+        trajectory(weak, "line", MOVE, PATH).initial(RobotTrajectoryInputs(START))
+    trajectory(ROBOT, "line", MOVE, PATH).initial(RobotTrajectoryInputs(START))

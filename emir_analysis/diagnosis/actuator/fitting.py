@@ -1,18 +1,12 @@
-"""Fitting an actuator's parameters and those of effects to the free run of its pressure.
-
-What is known beforehand counts, too: a fit is the most probable one (maximum a posteriori) with
-normally distributed parameters, around the data sheet's values, a quarter of the range wide, and
-around the trial values of effects. A short recording leaves some of many parameters nearly open;
-this keeps them where machines have them.
-"""
+"""Fitting an actuator's parameters and those of effects to the free run of its pressure."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import least_squares
 
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.signals import Array
@@ -27,11 +21,6 @@ EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
 ACCURACY = 1e-5  # relative, of cost and vector
 WIDE = 20.0  # a parameter whose range spans more than this factor is fitted as its logarithm
 SPREAD = math.log(4.0)  # of further starts: up to this factor from a known or a trial value
-WIDTH = 4.0  # standard deviations in the range of a data sheet's entry
-TYPICAL = 2.0  # deviation of an effect's parameter from its trial value, in trial values
-TYPICAL_FACTOR = 3.0  # the same where it is fitted as its logarithm
-REPEATED = 3.0  # such a deviation costs as much as this many rms errors: they are correlated
-GUESSED = 0.1  # rms error before the first fit, in spreads of the pressure
 DRAWN = 60  # places that are looked at for each further start; the best one is taken
 
 Mask = NDArray[np.bool_]
@@ -39,10 +28,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Unknown:
-    """One parameter: value = scale x, or scale exp(x) when logarithmic; low, high: bounds of x.
-
-    expected, deviation: of x, before anything is measured.
-    """
+    """One parameter: value = scale x, or scale exp(x) when logarithmic; low, high: bounds of x."""
 
     path: str
     unit: str
@@ -50,8 +36,6 @@ class Unknown:
     low: float
     high: float
     logarithmic: bool
-    expected: float
-    deviation: float
 
     def value(self, x: float) -> float:
         """Return the parameter's value."""
@@ -89,7 +73,7 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
     """Return what a data sheet leaves open and all parameters of the named effects."""
     stated = declared(sheet.machine)
     found = [
-        _stated(path, stated[path][0].unit, float(stated[path][1]), low, high)
+        _unknown(path, stated[path][0].unit, float(stated[path][1]), low, high)
         for path, (low, high) in sheet.ranges.items()
     ]
     for effect in effects:
@@ -111,7 +95,6 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
 ) -> Fitted:
     """Minimise the free-run error of the pressure, or of the part `seen` (n,) of it.
 
-    Parameters far from what is expected count as error, too; the rms error is without them.
     known: machine at which the search starts; effects that it lacks start at their trial values.
     restarts: further starts, each the best of some places anywhere in the data sheet's ranges or
     around that machine in turn, the same every time.
@@ -119,8 +102,6 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     members = unknowns(sheet, effects)
     low = np.array([member.low for member in members])
     high = np.array([member.high for member in members])
-    expected = np.array([member.expected for member in members])
-    prior = REPEATED / np.array([member.deviation for member in members])
     part = slice(None) if seen is None else seen
 
     def machine(x: Array) -> Actuator:
@@ -130,19 +111,17 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     parameters = flat_record(sheet.machine)
     places = [field(member.path) for member in members]
 
-    def surplus(x: Array, rms: float) -> Array:
+    def error(x: Array) -> Array:
         for place, member, v in zip(places, members, x, strict=True):
             parameters[place] = member.value(float(v))
         simulated = run(parameters, record.opening, record.period, float(record.pressure[0]))
-        unexpected = rms * prior * (x - expected)
-        return np.concatenate([unexpected, (simulated - record.pressure)[part]])
+        return np.asarray((simulated - record.pressure)[part])
 
-    def jacobian(x: Array, rms: float) -> Array:
-        here = surplus(x, rms)
+    def jacobian(x: Array) -> Array:
+        here = error(x)
         steps = np.where(x + STEP > high, -STEP, STEP)
         moved = x + np.diag(steps)
-        columns = [(surplus(row, rms) - here) / s for row, s in zip(moved, steps, strict=True)]
-        return np.stack(columns, 1)
+        return np.stack([(error(row) - here) / s for row, s in zip(moved, steps, strict=True)], 1)
 
     first = _start(members, effects, known)
     random = np.random.default_rng(0)
@@ -156,25 +135,30 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
         return np.append(random.uniform(low, high)[:stated], near()[stated:])
 
     def size(x: Array) -> float:
-        return float(np.mean(surplus(x, guessed) ** 2))
+        return float(np.mean(error(x) ** 2))
 
-    def solve(start: Array, rms: float) -> OptimizeResult:
-        return least_squares(
-            surplus, np.clip(start, low + margin, high - margin), jac=jacobian, args=(rms,),
-            bounds=(low, high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
-        )  # fmt: skip
-
-    margin = 1e-6 * (high - low)
-    guessed = GUESSED * float(np.std(record.pressure))
     starts = [first]
     for k in range(restarts):
         draw = near if k % 2 else anywhere
         starts.append(min((draw() for _ in range(DRAWN)), key=size))
-    rough = min((solve(start, guessed) for start in starts), key=lambda found: float(found.cost))
-    best = solve(rough.x, _rms(rough.fun[first.size :]))
-    x, measured = np.asarray(best.x), np.asarray(best.fun)[first.size :]
-    covariance = _covariance(np.asarray(best.jac)[first.size :], measured)
-    return Fitted(effects, members, machine(x), x, covariance, _rms(measured))
+    margin = 1e-6 * (high - low)
+    found = [
+        least_squares(
+            error, np.clip(start, low + margin, high - margin), jac=jacobian, bounds=(low, high),
+            xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
+        )
+        for start in starts
+    ]  # fmt: skip
+    best = min(found, key=lambda result: float(result.cost))
+    x = np.asarray(best.x)
+    return Fitted(
+        effects,
+        members,
+        machine(x),
+        x,
+        _covariance(np.asarray(best.jac), np.asarray(best.fun)),
+        math.sqrt(2.0 * float(best.cost) / best.fun.size),
+    )
 
 
 def free_run(machine: Actuator, record: ActuatorRecord) -> Array:
@@ -187,19 +171,12 @@ def free_run_error(machine: Actuator, record: ActuatorRecord) -> Array:
     return free_run(machine, record) - record.pressure
 
 
-def _stated(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
-    """Return an entry of the data sheet with its range."""
-    found = _unknown(path, unit, value, low, high)
-    return replace(found, deviation=(found.high - found.low) / WIDTH)
-
-
 def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
     if low * high > 0.0 and max(high / low, low / high) > WIDE:
-        least, most = sorted((math.log(low / value), math.log(high / value)))
-        width = math.log(TYPICAL_FACTOR)
-        return Unknown(path, unit, value, least, most, True, 0.0, width)
+        ends = sorted((math.log(low / value), math.log(high / value)))
+        return Unknown(path, unit, value, ends[0], ends[1], logarithmic=True)
     scale = abs(value) or max(abs(low), abs(high))
-    return Unknown(path, unit, scale, low / scale, high / scale, False, value / scale, TYPICAL)
+    return Unknown(path, unit, scale, low / scale, high / scale, logarithmic=False)
 
 
 def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) -> Array:
@@ -237,7 +214,3 @@ def _covariance(jacobian: Array, error: Array) -> Array:
     repeated = float(1.0 + 2.0 * np.sum(correlation[1 : size // 4] ** 2))
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
     return np.asarray(inverse * np.mean(error**2) * repeated)
-
-
-def _rms(error: Array) -> float:
-    return float(np.sqrt(np.mean(error**2)))

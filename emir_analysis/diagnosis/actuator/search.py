@@ -13,7 +13,6 @@ from emir_plant.actuator import REGISTRY, ActuatorSheet
 
 AT_NOISE = 1.1  # times the noise: free-run error of a model that lacks nothing
 PARTS = 4  # of the recording, each left out once: whole movements, not pieces between their like
-AS_GOOD = 1.15  # times the best error on parts left out: differences below depend on the start
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
 MOST_EFFECTS = 8
 BREADTH = 3  # sets of effects that are followed at a time: the best first one may lead astray
@@ -79,7 +78,7 @@ def search(
 
     plain = tested(Tried(plain_fit, _score(plain_fit.rms, independent, plain_fit.x.size)))
     tried = {_key(plain): plain}
-    followed = [plain]
+    accepted = followed = [plain]
     while (
         followed
         and len(followed[0].fitted.effects) < MOST_EFFECTS
@@ -99,9 +98,11 @@ def search(
         tried |= {_key(t): t for t in (*held, *ordered[MOST_TESTED:])}
         better = sorted((t for t in held if t.unseen < worst[_key(t)]), key=lambda t: t.unseen)
         better = [*_without(better[0], fitted, tested, tried), *better] if better else []
+        accepted = [*accepted, *better]
         followed = better[:BREADTH]
-    least = min(t.unseen for t in tried.values())
-    good = [t for t in tried.values() if t.unseen <= AS_GOOD * least]
+    block = max(1, round(slow))
+    best = min(accepted, key=lambda t: t.unseen)
+    good = [t for t in accepted if _is_as_good(t, best, block)]
     chosen = min(good, key=lambda t: (t.fitted.x.size, t.unseen))
     rivals = [t for t in good if t is not chosen and t.fitted.x.size <= chosen.fitted.x.size]
     return Search(plain, chosen, tuple(tried.values()), tuple(rivals))
@@ -133,7 +134,8 @@ def _without(
         fewer = []
         for name in best.fitted.effects:
             left = tuple(effect for effect in best.fitted.effects if effect != name)
-            fewer.append(tested(fitted(left, best.fitted)))  # again: now from a better start
+            if frozenset(left) not in tried:
+                fewer.append(tested(fitted(left, best.fitted)))
         tried |= {_key(t): t for t in fewer}
         fewer = [t for t in fewer if t.unseen < best.unseen]
         if not fewer:
@@ -141,6 +143,19 @@ def _without(
         best = min(fewer, key=lambda t: t.unseen)
         found.insert(0, best)
     return found
+
+
+def _is_as_good(one: Tried, best: Tried, block: int) -> bool:
+    """Return whether one set's error on parts left out is within a standard error of the best's.
+
+    Both are compared block by block, each of a slow period (Breiman et al. 1984).
+    """
+    if one.left_out is None or best.left_out is None:
+        return False
+    difference = one.left_out**2 - best.left_out**2
+    count = max(2, difference.size // block)
+    means = np.array([part.mean() for part in np.array_split(difference, count)])
+    return bool(means.mean() <= means.std(ddof=1) / math.sqrt(count))
 
 
 def _score(rms: float, independent: float, unknowns: int) -> float:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
+from emir_control.filling import NOT_FILLED, Filled, FillParameters
 from emir_control.limits import LimitParameters, off_the_ends
 from emir_control.motion_plan import MotionPlan, Planner, Target, UnderWay, resting
 from emir_control.prefilter import (
@@ -41,38 +42,6 @@ SAME = 1e-6  # m
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
 SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
-
-
-@dataclass(frozen=True, kw_only=True)
-class FillParameters:
-    """How the lowering chamber is filled before lowering where the logic block is shut.
-
-    The pump pushes the piston down on the shut lifting chamber until its pressure opens the
-    block, the slower the nearer: speed = rate * way left, risen to with an acceleration.
-    """
-
-    lead: float = quantity("s", 0.0, 30.0, "before the move; 0: no filling", default=7.0)
-    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=1e5)
-    rate: float = quantity("1/s", 0.01, 10.0, "speed over way left", default=0.8)
-    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=1e-3)
-    stopping: float = quantity(
-        "s", 0.032, 10.0, "from the slowest speed; a period of the boom", default=1.5
-    )
-    acceleration: float = quantity("m/s^2", 1e-4, 1.0, "of the piston", default=2.5e-3)
-    damping: float = quantity("1/s", 0.0, 20.0, "speed by the force's deviation / k_h", default=3.0)
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
-
-    def velocity(
-        self, filled: "Filled", missing: float, drive: Actuator, stroke: float, dt: float
-    ) -> float:
-        """Return the speed, m/s, with a pressure, Pa, missing to the aim."""
-        if missing <= 0.0:
-            return max(filled.velocity - self.slowest / self.stopping * dt, 0.0)
-        left = missing * drive.compression(stroke)
-        wanted = max(self.rate * left, self.slowest)
-        return min(wanted, filled.velocity + self.acceleration * dt)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,31 +95,16 @@ class Rest(NamedTuple):
     angle: float
 
 
-class Filled(NamedTuple):
-    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s.
-
-    over: it has come to its end.
-    """
-
-    moved: float
-    velocity: float
-    over: bool = False
-
-
-NOT_FILLED = Filled(0.0, 0.0)
-
-
 class LqgState(NamedTuple):
     """Where the control stands.
 
-    offset: of the measured bending, rad, in
-    gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
-    of the valve of commands that are under way, the newest first. cut: the move was to end too
+    offset: of the measured bending, rad, in gravity of cos(alpha) = 1. estimate: (n,) x. past,
+    openings: u off the plan, m/s, and openings of the valve of commands that are under way, the
+    newest first. logic: block's opening. command: the last one. moving: a move is under way or is
+    to begin. filled: what a filling of the lowering chamber has told. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
     seems to come or to go. reference: m, of the last period of standing by. known: it stands by
     since before the move. joins: it may take over in the move.
-    logic: block's opening. command: the last one. moving: a move is under way or about to begin.
-    filled: what a filling of the lowering chamber has told.
     """
 
     plan: MotionPlan

@@ -106,8 +106,8 @@ def situation(
 
 
 @runtime_checkable
-class TakesOverAtRest(NodeControl, Protocol):
-    """A controller that plans whole moves: it takes over between two of them."""
+class PlansMoves(NodeControl, Protocol):
+    """A controller that plans whole moves: it says itself when it may take over."""
 
     def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
         """Return the next state while another drives, and what is offered. state None: begin."""
@@ -316,8 +316,9 @@ class LqgControl:
         """Return the next state while another drives, and what is offered. state None: begin."""
         inputs = self._inputs(signals)
         state, ready = self.lqg.stand_by(state or self.lqg.initial(inputs), inputs)
-        shut = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
-        return state, _lqg_signals(self.name, shut) | self._offered(0.0, ready=ready)
+        waiting = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
+        command = state.command if state.joins else 0.0
+        return state, _lqg_signals(self.name, waiting) | self._offered(command, ready=ready)
 
     def _offered(self, command: float, *, ready: bool = True) -> Signals:
         """Return the command as the velocity that the prefilter turns into it."""

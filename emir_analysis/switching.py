@@ -12,9 +12,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from emir_analysis.node_controls import (
     NodeControl,
+    PlansMoves,
     Signals,
     Switchable,
-    TakesOverAtRest,
     Topics,
 )
 from emir_common.quantity import ParameterError
@@ -46,8 +46,8 @@ class Ready:
 
         A controller that is not `Switchable` begins anew when it is chosen.
         """
-        if isinstance(self.control, TakesOverAtRest):
-            return self._step_at_rest(self.control, state, signals, dt)
+        if isinstance(self.control, PlansMoves):
+            return self._step_planned(self.control, state, signals, dt)
         before = start = self._caught_up(state, signals, dt)
         stands_by = before is not None and not self._drives(signals)
         if stands_by and isinstance(self.control, Switchable):
@@ -57,8 +57,8 @@ class Ready:
         terms = {name: value for name, value in outputs.items() if name != "velocity_command"}
         return ReadyState(before, own, signals), terms | offered
 
-    def _step_at_rest(
-        self, control: TakesOverAtRest, state: ReadyState | None, signals: Signals, dt: float
+    def _step_planned(
+        self, control: PlansMoves, state: ReadyState | None, signals: Signals, dt: float
     ) -> tuple[ReadyState, Signals]:
         own = state.own if state else None
         if self._drives(signals):

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
-from emir_control.boom import Boom
+from emir_control.boom import Boom, ClampedBoom
 from emir_control.least_bending import NoMotionError
 
 Array = NDArray[np.float64]
 
 PARTS = 4  # of a period, at whose ends the deflection counts: 8 ms resolve the fastest mode, 63 Hz
 PLANNED_MODES = 2  # that have to rest at the end; the others swing by little
+BENDING, CHANGE = 1e-2, 4e-3  # m, m/s: what counts as one where a motion under way is taken over
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,21 @@ class HeldTask:
     count: int
 
 
+@dataclass(frozen=True, eq=False)
+class Begin:
+    """A motion under way, that goes on with its velocity for some periods.
+
+    bent, swinging: (n,) z and z'. rate: rad/s, of the joint. pushed: s, m. velocity: u, m/s.
+    """
+
+    bent: Array
+    swinging: Array
+    rate: float
+    pushed: float
+    velocity: float
+    periods: int
+
+
 def gentlest(boom: Boom, drive: Drive, task: HeldTask, allowance: float) -> HeldMotion:
     """Return the motion of least valve travel whose deflection is within an allowance, 1.
 
@@ -74,22 +90,74 @@ def gentlest(boom: Boom, drive: Drive, task: HeldTask, allowance: float) -> Held
     """
     clamped = boom.clamped()
     n = len(clamped.drive)
-    kernel = _kernel(boom, drive, task)
+    held = _held(boom, drive, task.period)
+    kernel = _kernel(held, task.count)
     bending = _shifted(kernel[:, :n] @ clamped.deflection, task.count)[1:]
-    ends = kernel[PARTS::PARTS][::-1].T
-    slow = [*range(PLANNED_MODES), *range(n, n + PLANNED_MODES)]
-    program = _Program(drive, task, ends[2 * n], ends[[*slow, 2 * n + 1, 2 * n + 2]])
+    program = _Program(drive, task, *_ends(kernel, n))
     least = program.least(bending)
     velocity = program.least_travel(bending, (1.0 + allowance) * least)
-    states = np.stack([_shifted(column, task.count) @ velocity for column in kernel.T], axis=1)
+    return _motion(clamped, velocity, kernel)
+
+
+def onward(boom: Boom, drive: Drive, task: HeldTask, begin: Begin) -> HeldMotion:
+    """Return the motion that leads one under way to the task's end, at rest there.
+
+    Of all such it has the smallest sum of squares of bending and of changes of the velocity: a
+    system of equations, which takes no time. The valve's flow is not looked at.
+    """
+    clamped, count = boom.clamped(), task.count
+    n = len(clamped.drive)
+    held = _held(boom, drive, task.period)
+    kernel = _kernel(held, count)
+    free = np.zeros((len(kernel), 2 * n + 4))
+    free[0] = np.concatenate([begin.bent, begin.swinging, [0.0, begin.rate, begin.pushed, 0.0]])
+    for k in range(len(free) - 1):
+        free[k + 1] = held @ free[k]
+    free = free[:, :-1]
+    bending = _shifted(kernel[:, :n] @ clamped.deflection, count) / (BENDING * np.sqrt(PARTS))
+    bent = free[:, :n] @ clamped.deflection / (BENDING * np.sqrt(PARTS))
+    change = np.diff(np.eye(count), axis=0, append=0.0) / CHANGE
+    turn, rest = _ends(kernel, n)
+    turn_free, rest_free = _ends_of(free[-1], n)
+    fixed = np.vstack([np.eye(count)[: begin.periods], turn, rest])
+    values = np.full(begin.periods, begin.velocity), [task.turn - turn_free], -rest_free
+    scale = np.max(abs(fixed), axis=1)
+    rows = fixed / scale[:, np.newaxis]
+    system = np.block([
+        [bending.T @ bending + change.T @ change, rows.T],
+        [rows, np.zeros((len(rows), len(rows)))],
+    ])  # fmt: skip
+    right = np.concatenate([-bending.T @ bent, np.concatenate(values) / scale])
+    velocity = np.linalg.solve(system, right)[:count]
+    return _motion(clamped, velocity, kernel, free)
+
+
+def _motion(
+    clamped: ClampedBoom, velocity: Array, kernel: Array, free: Array | float = 0.0
+) -> HeldMotion:
+    """Return the motion by the velocities; kernel: of `_kernel`; free: without them."""
+    n = len(clamped.drive)
+    columns = [_shifted(column, len(velocity)) @ velocity for column in kernel.T]
+    states = np.stack(columns, axis=1) + free
     bent = states[:, :n]
     return HeldMotion(
         velocity, states[:, 2 * n], bent, states[:, 2 * n + 2], bent @ clamped.deflection
     )
 
 
-def _kernel(boom: Boom, drive: Drive, task: HeldTask) -> Array:
-    """Return (z, z', alpha, alpha', s) after each part of u = 1 m/s in the first period."""
+def _ends(kernel: Array, n: int) -> tuple[Array, Array]:
+    """Return what each period's velocity makes of the end: turn, (count,), rest, (k, count)."""
+    return _ends_of(kernel[PARTS::PARTS][::-1].T, n)
+
+
+def _ends_of(states: Array, n: int) -> tuple[Array, Array]:
+    """Return the turn of states (2 n + 3, ...), and what has to be 0 at the end."""
+    slow = [*range(PLANNED_MODES), *range(n, n + PLANNED_MODES)]
+    return states[2 * n], states[[*slow, 2 * n + 1, 2 * n + 2]]
+
+
+def _held(boom: Boom, drive: Drive, period: float) -> Array:
+    """Return what a part of a period makes of (z, z', alpha, alpha', s, u)."""
     clamped = boom.clamped()
     n = len(clamped.drive)
     bent, swinging, angle, rate, pushed = slice(n), slice(n, 2 * n), 2 * n, 2 * n + 1, 2 * n + 2
@@ -105,8 +173,12 @@ def _kernel(boom: Boom, drive: Drive, task: HeldTask) -> Array:
     model[rate, :-1] = joint
     model[pushed, rate] = -(drive.arm + drive.slope / drive.stiffness)
     model[pushed, -1] = 1.0
-    held = expm(task.period / PARTS * model)
-    states = np.zeros((task.count * PARTS + 1, 2 * n + 4))
+    return np.asarray(expm(period / PARTS * model))
+
+
+def _kernel(held: Array, count: int) -> Array:
+    """Return (z, z', alpha, alpha', s) after each part of u = 1 m/s in the first period."""
+    states = np.zeros((count * PARTS + 1, len(held)))
     for k in range(len(states) - 1):
         states[k, -1] = float(k < PARTS)
         states[k + 1] = held @ states[k]

@@ -21,51 +21,27 @@ from numpy.typing import NDArray
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.boom import Boom, BoomTable
+from emir_control.filling import NOT_FILLED, Filled, FillParameters
 from emir_control.limits import LimitParameters, off_the_ends
-from emir_control.motion_plan import MotionPlan, Planner, Target, resting
-from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
-from emir_control.regulator import Regulator, RegulatorParameters, regulator
+from emir_control.motion_plan import MotionPlan, Planner, Target, UnderWay, resting
+from emir_control.prefilter import (
+    joint_angle,
+    piston_stroke,
+    piston_velocity,
+)
+from emir_control.regulator import Filter, Regulator, RegulatorParameters, regulator
 from emir_control.trajectory import NO_MOVE, Move
 
 Array = NDArray[np.float64]
 
 LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 STANDING_BY = 2  # times the reading time: another controller may leave the boom swinging
+TO_JOIN = 1.0  # s of a move that have to be left for another one to take over
+TO_CATCH_UP = 0.5  # s after the move's end: who drove before may have been behind
+SAME = 1e-6  # m
 SHUT_DECAY = 0.8  # of the unknown flow from period to period while the valve is shut
 SURPRISE_SHARE = 0.2  # of a period in the mean surprise
 SURPRISE = 4.0  # squared innovation, 1 as expected, that tells of a load that came or went
-
-
-@dataclass(frozen=True, kw_only=True)
-class FillParameters:
-    """How the lowering chamber is filled before lowering where the logic block is shut.
-
-    The pump pushes the piston down on the shut lifting chamber until its pressure opens the
-    block, the slower the nearer: speed = rate * way left, risen to with an acceleration.
-    """
-
-    lead: float = quantity("s", 0.0, 30.0, "before the move; 0: no filling", default=7.0)
-    margin: float = quantity("Pa", 0.0, 5e6, "over the threshold", default=1e5)
-    rate: float = quantity("1/s", 0.01, 10.0, "speed over way left", default=0.8)
-    slowest: float = quantity("m/s", 1e-5, 0.1, "speed", default=1e-3)
-    stopping: float = quantity(
-        "s", 0.032, 10.0, "from the slowest speed; a period of the boom", default=1.5
-    )
-    acceleration: float = quantity("m/s^2", 1e-4, 1.0, "of the piston", default=2.5e-3)
-    damping: float = quantity("1/s", 0.0, 20.0, "speed by the force's deviation / k_h", default=3.0)
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
-
-    def velocity(
-        self, filled: "Filled", missing: float, drive: Actuator, stroke: float, dt: float
-    ) -> float:
-        """Return the speed, m/s, with a pressure, Pa, missing to the aim."""
-        if missing <= 0.0:
-            return max(filled.velocity - self.slowest / self.stopping * dt, 0.0)
-        left = missing * drive.compression(stroke)
-        wanted = max(self.rate * left, self.slowest)
-        return min(wanted, filled.velocity + self.acceleration * dt)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,30 +95,16 @@ class Rest(NamedTuple):
     angle: float
 
 
-class Filled(NamedTuple):
-    """What the filling of the lowering chamber has done: piston moved by, m, and speed, m/s.
-
-    over: it has come to its end.
-    """
-
-    moved: float
-    velocity: float
-    over: bool = False
-
-
-NOT_FILLED = Filled(0.0, 0.0)
-
-
 class LqgState(NamedTuple):
     """Where the control stands.
 
-    offset: of the measured bending, rad, in
-    gravity of cos(alpha) = 1. estimate: (n,) x. past, openings: u off the plan, m/s, and openings
-    of the valve of commands that are under way, the newest first. cut: the move was to end too
+    offset: of the measured bending, rad, in gravity of cos(alpha) = 1. estimate: (n,) x. past,
+    openings: u off the plan, m/s, and openings of the valve of commands that are under way, the
+    newest first. logic: block's opening. command: the last one. moving: a move is under way or is
+    to begin. filled: what a filling of the lowering chamber has told. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
-    seems to come or to go. reference: m, of the last period of standing by.
-    logic: block's opening. command: the last one. moving: a move is under way or about to begin.
-    filled: what a filling of the lowering chamber has told.
+    seems to come or to go. reference: m, of the last period of standing by. known: it stands by
+    since before the move. joins: it may take over in the move.
     """
 
     plan: MotionPlan
@@ -161,6 +123,8 @@ class LqgState(NamedTuple):
     surprise: float = 1.0
     loaded: bool = False
     reference: float = math.nan
+    known: bool = False
+    joins: bool = False
 
 
 class LqgInputs(NamedTuple):
@@ -241,7 +205,8 @@ class Lqg:
         time = inputs.move.since if state.moving else math.inf
         target = plan.at(time)
         arrived = waits or time >= plan.ends
-        estimate, surprise = self._corrected(state, inputs, target, arrived=arrived)
+        known = law.at_rest if arrived else law.moving
+        estimate, surprise = self._corrected(state, inputs, target, known)
         loaded = surprise > (1.0 if state.loaded else SURPRISE)
         state = state._replace(surprise=surprise, loaded=loaded)
         from_plan = plan.velocity(time + self._late, dt)
@@ -274,10 +239,10 @@ class Lqg:
         """Return the next state while another one drives, and whether this one may take over.
 
         It may where the reference has rested for long enough to read the payload, swinging boom or
-        not.
+        not; and in a move that it has watched from the start, with time left.
         """
         if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
-            return state._replace(reference=math.nan), False
+            return state._replace(reference=math.nan, known=False, joins=False), False
         moves = inputs.reference != state.reference or self._under_way(inputs.move)
         enough = STANDING_BY * self._enough
         rest = self._read(state.rest, inputs, 1 if moves else state.rest.periods + 1, enough)
@@ -285,7 +250,55 @@ class Lqg:
         state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
         if rest.periods == enough:
             state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
-        return state._replace(reference=inputs.reference), rest.periods >= enough
+        elif rest.periods < enough:
+            state = self._watched(state, inputs)
+        place = state.plan.at(math.inf).stroke
+        known = state.known if inputs.move.since >= 0.0 else abs(inputs.reference - place) < SAME
+        joins = known and 0.0 <= inputs.move.since < inputs.move.duration - TO_JOIN
+        state = self._continuing(state, inputs) if joins else state
+        state = state._replace(reference=inputs.reference, known=known, joins=joins)
+        return state, joins or rest.periods >= enough
+
+    def _watched(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the motion off the last rest, by whatever commands it."""
+        law, target = state.regulator, state.plan.at(math.inf)
+        estimate, _ = self._corrected(state, inputs, target, law.watching)
+        return state._replace(estimate=law.A @ estimate)
+
+    def _continuing(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the command that goes on with u as it has been found."""
+        stroke = piston_stroke(inputs.angle, self.parameters.actuator.static)
+        oil = Oil(stroke, inputs.pressure_lifting, inputs.pressure_lowering, state.logic)
+        opening = self.drive.opening(float(state.estimate[state.regulator.flow]), _open(oil))
+        openings = (opening,) * len(state.openings)
+        return state._replace(command=self.drive.command(opening), openings=openings)
+
+    def _joined(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that leads the move under way, another one's, to its end."""
+        p, law, move = self.parameters, state.regulator, inputs.move
+        rest = state.plan.at(math.inf)
+        x, _ = self._corrected(state, inputs, rest, law.watching)
+        boom = p.boom.loaded(state.payload)
+        clamped, modes = boom.clamped(), np.zeros((2, len(boom.joint)))
+        modes[:, : law.modes] = x[: law.modes], x[law.modes : 2 * law.modes]
+        now = UnderWay(
+            time=move.since,
+            angle=rest.angle + float(boom.joint @ modes[0]),
+            rate=float(boom.joint @ modes[1]),
+            shape=boom.sag() * math.cos(rest.angle) + clamped.rigid * rest.angle + modes[0],
+            swinging=modes[1],
+            force=rest.force + state.plan.stiffness * float(x[2 * law.modes] - x[law.force]),
+            velocity=float(x[law.flow]),
+        )
+        _, end = self._off_the_ends(state.rest, (rest.stroke, rest.stroke + move.distance))
+        left = move.duration - move.since + TO_CATCH_UP
+        plan = self.planner.onward(boom, now, end, left)
+        estimate = np.zeros(len(law.A))
+        estimate[law.force] = x[law.force] * state.plan.stiffness / plan.stiffness
+        return state._replace(
+            plan=plan, estimate=estimate, past=(0.0,) * law.delays, moving=True, joins=False,
+            cut=end != rest.stroke + move.distance, surprise=1.0, loaded=False,
+        )  # fmt: skip
 
     @property
     def _begins(self) -> float:
@@ -373,6 +386,8 @@ class Lqg:
     def _prepared(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state with a plan for the move that begins, or the rest's means."""
         p = self.parameters
+        if state.joins:
+            return self._joined(state, inputs)
         if self._under_way(inputs.move):
             if state.moving:
                 return state
@@ -464,7 +479,7 @@ class Lqg:
         return off_the_ends(min(max(wanted, -p.speed), p.speed), stroke, 0.0, p)
 
     def _corrected(
-        self, state: LqgState, inputs: LqgInputs, target: Target, *, arrived: bool
+        self, state: LqgState, inputs: LqgInputs, target: Target, known: Filter
     ) -> tuple[Array, float]:
         """Return x corrected by what is measured, and the mean surprise."""
         law = state.regulator
@@ -476,7 +491,6 @@ class Lqg:
             (force - target.force) / state.plan.stiffness,
         ])  # fmt: skip
         innovation = measured - law.C @ state.estimate
-        known = law.at_rest if arrived else law.moving
         squared = float(innovation @ known.certainty @ innovation) / len(innovation)
         surprise = state.surprise + SURPRISE_SHARE * (squared - state.surprise)
         gain = known.loaded if state.loaded else known.gain

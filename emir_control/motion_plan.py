@@ -13,11 +13,21 @@ from numpy.typing import NDArray
 
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
-from emir_control.drive_plan import PARTS, Drive, HeldTask, gentlest
+from emir_control.drive_plan import (
+    PARTS,
+    Begin,
+    Drive,
+    HeldMotion,
+    HeldTask,
+    gentlest,
+    onward,
+)
 from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
 from emir_control.trajectory import Move
 
 Array = NDArray[np.float64]
+
+Pair = tuple[float, float]
 
 SHORTEST = 10  # control periods
 
@@ -81,6 +91,22 @@ class MotionPlan:
         return (self.at(time + dt).stroke - self.at(time).stroke) / dt
 
 
+class UnderWay(NamedTuple):
+    """A motion at an instant.
+
+    time: s, since the move's start. angle, rate: rad, rad/s, of the joint. shape, swinging: (m,)
+    modal coordinates, weight included, and their rates. force: F, N. velocity: u, m/s.
+    """
+
+    time: float
+    angle: float
+    rate: float
+    shape: Array
+    swinging: Array
+    force: float
+    velocity: float
+
+
 @dataclass(frozen=True)
 class Planner:
     """Plans moves for commands that act once a period, s, `late`, s, after the measurement.
@@ -102,23 +128,57 @@ class Planner:
         linkage = drive.parameters.static
         ends = joint_angle(start, linkage), joint_angle(start + move.distance, linkage)
         turn = ends[1] - ends[0]
-        middle = Drive(
-            arm=move.distance / turn,
-            stiffness=drive.stiffness(start + 0.5 * move.distance),
-            slope=(holding(boom, drive, ends[1]) - holding(boom, drive, ends[0])) / turn,
-            low=-linkage.flow_lowering / linkage.area_lowering,
-            high=linkage.flow_lifting / linkage.area_lifting,
-        )
+        middle = self._middle(boom, (start, start + move.distance), ends)
         count = max(round(move.duration / self.period), SHORTEST)
         task = HeldTask(turn, self.period, count)
         motion = gentlest(boom, middle, task, self.allowance)
-        angle = ends[0] + motion.angle
+        return self._laid_out(boom, middle, ends[0], motion, self._first(move.since))
+
+    def onward(self, boom: Boom, now: UnderWay, end: float, left: float) -> MotionPlan:
+        """Return the plan that leads a motion under way to rest at a stroke, m, in s left."""
+        drive, linkage = self.drive, self.drive.parameters.static
+        here, there = piston_stroke(now.angle, linkage), joint_angle(end, linkage)
+        middle = self._middle(boom, (here, end), (now.angle, there))
+        clamped, sag = boom.clamped(), boom.sag()
+        bent = now.shape - clamped.rigid * now.angle - sag * math.cos(now.angle)
+        swinging = now.swinging - now.rate * (clamped.rigid - sag * math.sin(now.angle))
+        arm = piston_velocity(1.0, now.angle, linkage)
+        pushed = (now.force - holding(boom, drive, now.angle)) / middle.stiffness
+        begin = Begin(
+            bent=clamped.shapes.T @ bent,
+            swinging=clamped.shapes.T @ swinging,
+            rate=now.rate,
+            pushed=pushed * arm / middle.arm,
+            velocity=now.velocity,
+            periods=math.ceil(self.late / self.period),
+        )
+        task = HeldTask(there - now.angle, self.period, round(left / self.period))
+        return self._laid_out(boom, middle, now.angle, onward(boom, middle, task, begin), now.time)
+
+    def _middle(self, boom: Boom, strokes: Pair, angles: Pair) -> Drive:
+        """Return the drive about the middle between two strokes, m, at angles, rad."""
+        drive, linkage = self.drive, self.drive.parameters.static
+        turn = angles[1] - angles[0]
+        return Drive(
+            arm=(strokes[1] - strokes[0]) / turn,
+            stiffness=drive.stiffness(0.5 * (strokes[0] + strokes[1])),
+            slope=(holding(boom, drive, angles[1]) - holding(boom, drive, angles[0])) / turn,
+            low=-linkage.flow_lowering / linkage.area_lowering,
+            high=linkage.flow_lifting / linkage.area_lifting,
+        )
+
+    def _laid_out(
+        self, boom: Boom, middle: Drive, start: float, motion: HeldMotion, begins: float
+    ) -> MotionPlan:
+        """Return the plan of a motion from an angle, rad, and a time, s, on."""
+        drive, linkage = self.drive, self.drive.parameters.static
+        angle = start + motion.angle
         shape = np.outer(np.cos(angle), boom.sag()) + motion.bent @ boom.clamped().shapes.T
         arms = np.array([piston_velocity(1.0, each, linkage) for each in angle])
         pushed = middle.stiffness * middle.arm / arms * motion.pushed
         return MotionPlan(
             stiffness=middle.stiffness,
-            begins=self._first(move.since),
+            begins=begins,
             step=self.period / PARTS,
             angle=angle,
             stroke=np.array([piston_stroke(each, linkage) for each in angle]),

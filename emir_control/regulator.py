@@ -58,6 +58,9 @@ AT_REST = NoiseParameters(
 )  # a resolver of 12 bits: a step over the root of 12
 
 
+WATCHING = NoiseParameters(flow_drift=3e-3, velocity_noise=2e-2)  # whoever commands u
+
+
 @dataclass(frozen=True, kw_only=True)
 class RegulatorParameters:
     """Noise that the Kalman filter reckons with, and what the feedback weighs.
@@ -95,7 +98,8 @@ class Regulator:
     """x(k+1) = A x + B [u(k), u(k-1) ...], y = C x, with x = (q, q', s, f, d, p).
 
     modes: m in q. A: (n, n), n = 2 m + 4. B: (n, l + 1), for u now and l past ones. C: (3, n):
-    joint angle, rad, bending, rad, s, m. moving, at_rest: the filter of x. feedback:
+    joint angle, rad, bending, rad, s, m. moving, at_rest: the filter of x; watching: where another
+    one drives, u being in d. feedback:
     (2 m + 1 + l,), on w = (q, q', s, past u); w(k+1) = extended w + driven u. stage, cost:
     matrices of the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
     held: (2 m + 1,) where (q, q', s) rests under p = 1 N, the joint in its place.
@@ -107,6 +111,7 @@ class Regulator:
     C: Array
     moving: Filter
     at_rest: Filter
+    watching: Filter
     feedback: Array
     extended: Array
     driven: Array
@@ -180,6 +185,7 @@ def regulator(
         C=C,
         moving=_filter((A, B, C), stiffness, p.moving),
         at_rest=_filter((A, B, C), stiffness, p.at_rest),
+        watching=_filter((A, B, C), stiffness, WATCHING),
         feedback=feedback,
         extended=extended,
         driven=driven[:, 0],

@@ -3,7 +3,7 @@
 Plan, observer and feedback take the oil for `softness` times as stiff as stated, the machine's is
 `stiffness` times as stiff. The plan's force F_p, off that at rest, then takes another flow, by
 
-    d = (1 / softness - 1 / stiffness) F_p' / k_h
+    d = (1 / softness - 1 / stiffness) F_p' / k_h    (k_h as stated)
 
 and the boom bends off its plan, from which the feedback brings it back. Both are linear, so the
 largest bending in a move follows without the machine; chosen is the softness for which it is

@@ -63,7 +63,7 @@ class SelectorNode(ControlNode):
     def status(self) -> str:
         """Return who drives, and who will."""
         name = self.state.name if self.state else self.chosen
-        waits = f"; {name} will, at rest" if name != self.chosen else ""
+        waits = f"; {name} will, at rest or early in a move" if name != self.chosen else ""
         return f"{self.chosen} drives the machine{waits}"
 
     def _check(self, name: str) -> None:

@@ -93,6 +93,18 @@ def test_an_effect_is_found_and_carries_to_the_other_recording(
     assert np.sqrt(np.mean(error**2)) == pytest.approx(signal.with_effect, rel=1e-6)
 
 
+def test_a_parameter_stated_as_zero_is_fitted(folder: Path) -> None:
+    stated = "viscous_friction: {value: 0.5"
+    assert stated in recorded.SHEET
+    text = recorded.SHEET.replace(stated, "viscous_friction: {value: 0.0")
+    (folder / "sheet.yaml").write_text(text)
+    bag, _ = recorded.record(folder, _proportional)
+    sheet = load_actuator(folder / "sheet.yaml")
+    record = open_record(bag, read_signal_map(folder / "signals.yaml"))
+    found = fit(sheet, (), record, sheet.machine).machine
+    assert found.load.viscous_friction == pytest.approx(recorded.FRICTION, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [

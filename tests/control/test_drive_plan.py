@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from emir_analysis.machine_model import actuator, boom_table
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
-from emir_control.drive_plan import PARTS, Drive, HeldTask, gentlest
+from emir_control.drive_plan import PARTS, Begin, Drive, HeldTask, gentlest, onward
 from emir_control.least_bending import NoMotionError, Task, limit
 from emir_control.motion_plan import Planner
 from emir_control.trajectory import Move
@@ -75,6 +75,34 @@ def test_more_allowance_moves_the_valve_less() -> None:
         for allowed in (0.02, 0.3)
     ]
     assert travel[1] < 0.8 * travel[0]
+
+
+@pytest.mark.parametrize("payload", [0.0, 1200.0])
+def test_a_motion_under_way_is_led_to_its_end(payload: float) -> None:
+    """From the middle of another one, that had gone on by its own velocities."""
+    boom = _boom(payload)
+    clamped, m, done = boom.clamped(), len(boom.joint), 45
+    before = gentlest(boom, DRIVE, TASK, ALLOWANCE)
+    x = _free(boom, before.velocity[:done])[:, -1]
+    q, swinging = x[:m], x[m:]
+    begin = Begin(
+        bent=clamped.shapes.T @ (q - clamped.rigid * (boom.joint @ q)),
+        swinging=clamped.shapes.T @ (swinging - clamped.rigid * (boom.joint @ swinging)),
+        rate=float(boom.joint @ swinging),
+        pushed=float(before.pushed[done * PARTS]),
+        velocity=float(before.velocity[done - 1]),
+        periods=2,
+    )
+    left = HeldTask(TASK.turn - float(boom.joint @ q), TASK.period, TASK.count - done)
+    after = onward(boom, DRIVE, left, begin)
+    assert after.velocity[:2] == pytest.approx(begin.velocity)
+    states = _free(boom, np.concatenate([before.velocity[:done], after.velocity]))
+    largest = abs(before.deflection).max()
+    assert boom.joint @ states[:m, -1] == pytest.approx(TASK.turn, abs=1e-5)
+    assert abs(boom.joint @ states[m:, -1]) < 1e-4
+    assert abs(boom.deflection @ states[:m, -1]) < 0.02 * largest
+    swing = boom.deflection @ states[:m, done * PARTS :]
+    assert after.deflection == pytest.approx(swing, abs=1e-3 * largest)
 
 
 def test_too_far_for_the_valves_flow() -> None:

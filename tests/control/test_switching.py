@@ -133,11 +133,11 @@ def test_a_plan_of_switching_that_cannot_be_is_refused(
 
 @pytest.fixture(scope="module")
 def by_way_of_lqg() -> dict[str, np.ndarray]:
-    """Cascade, LQG asked for in mid-move, PFC asked for in the middle of LQG's own move."""
+    """Cascade, LQG asked for near a move's end, PFC in the middle of LQG's own move."""
     lqg = LqgControl(Lqg(lqg_parameters(joint1())))
     controls = {"cascade": CONTROLS["cascade"], "lqg": lqg, "pfc": CONTROLS["pfc"]}
     back = 1.0 + 3.3 + 5.0  # s, when the way back begins
-    switches = Switch(0.0, "cascade"), Switch(2.5, "lqg"), Switch(back + 1.6, "pfc")
+    switches = Switch(0.0, "cascade"), Switch(3.5, "lqg"), Switch(back + 1.6, "pfc")
     trajectory = named("lift-lower", TrajectoryParameters())
     loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
     return loop.run(math.pi / 4, 2e6, 17.6)
@@ -146,7 +146,7 @@ def by_way_of_lqg() -> dict[str, np.ndarray]:
 def test_lqg_takes_over_when_the_machine_rests(by_way_of_lqg: dict[str, np.ndarray]) -> None:
     run = by_way_of_lqg
     first = int(np.argmax(run["lqg_active"]))
-    assert first * 0.032 > 4.3 + 1.0  # asked for at 2.5 s; the reference rests from 4.3 s on
+    assert first * 0.032 > 4.3 + 1.0  # asked for at 3.5 s; the reference rests from 4.3 s on
     assert run["move_since"][first] < -1.0  # the next move is not near
     assert run["lqg_ready"][first] == 1.0
     assert run["valve_command"][first] == 0.0
@@ -172,3 +172,23 @@ def test_lqg_hands_its_command_on_and_over_in_mid_move(
     assert velocity[last + 1] == pytest.approx(velocity[last], abs=1e-9)
     assert valve[last + 1] == pytest.approx(valve[last], abs=0.04)
     assert run["true_stroke"][-1] == pytest.approx(run["reference_stroke"][-1], abs=3e-3)
+
+
+@pytest.mark.parametrize("first", ["cascade", "pfc"])
+def test_lqg_takes_over_in_mid_move(first: str) -> None:
+    """It goes on with the flow that it has found, leads the move to its end, and calms the boom."""
+    lqg = LqgControl(Lqg(lqg_parameters(joint1())))
+    switches = Switch(0.0, first), Switch(SWITCH * 0.032, "lqg")
+    loop = SwitchedLoop({first: CONTROLS[first], "lqg": lqg}, switches)
+    trajectory = named("lift-lower", TrajectoryParameters())
+    run = ClosedLoop(Plant(joint1()), trajectory, loop).run(math.pi / 4, 2e6, 9.024)
+    assert np.all(run[f"{first}_active"][:SWITCH] == 1.0)
+    assert np.all(run["lqg_active"][SWITCH:] == 1.0)
+    valve = run["valve_command"]
+    assert valve[SWITCH - 1] > 0.4  # it moves
+    assert valve[SWITCH] == pytest.approx(valve[SWITCH - 1], abs=0.04)
+    assert abs(np.diff(valve))[SWITCH - 1 : SWITCH + 3].max() < 0.08
+    stop, swing = round(4.3 / 0.032) * TICKS, abs(dynamic_deflection(run))
+    assert swing[SWITCH * TICKS :].max() < 0.02  # conventional control's own: 0.033
+    assert swing[stop + 125 :].max() < 0.005
+    assert run["true_stroke"][-1] == pytest.approx(run["reference_stroke"][-1], abs=1e-3)

@@ -171,20 +171,21 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
 
 
 def test_switching_by_way_of_lqg_in_lock_step_equals_the_plain_loop(tmp_path: Path) -> None:
-    """LQG begins, PFC goes on while it lifts: the force loop hands on, then damps."""
+    """PFC begins, LQG takes over while it lifts, and back: the force loop hands on, then damps."""
     bag = tmp_path / "run"
-    words = ["--controller", "lqg", "--switch", "2.5=pfc", "--duration", "3.2"]
+    words = ["--controller", "pfc", "--switch", "2=lqg", "--switch", "2.6=pfc", "--duration", "3.2"]
     assert run_graph([*words, "--bag", str(bag)]) == 0
     controls = {
         "lqg": LqgControl(Lqg(lqg_parameters(joint1()))),
         "pfc": PfcControl(Pfc(pfc_file.load(pfc_file.default_file(STROKE), STROKE))),
     }
-    switches = (Switch(0.0, "lqg"), Switch(2.5, "pfc"))
+    switches = (Switch(0.0, "pfc"), Switch(2.0, "lqg"), Switch(2.6, "pfc"))
     trajectory = named("lift-lower", TrajectoryParameters())
     loop = ClosedLoop(Plant(joint1()), trajectory, SwitchedLoop(controls, switches))
     expected = loop.run(math.pi / 4, 2e6, 3.2)
+    assert 0.5 < 0.032 * expected["lqg_active"].sum() < 0.7
     recorded = _read_with_rosbags(bag)
-    plan = Plan(bag=bag, controller="lqg", switches=switches[1:])
+    plan = Plan(bag=bag, controller="pfc", switches=switches[1:])
     names = [name for name in plan.topics if f"/{name}" in recorded]
     assert {"lqg/velocity_command", "force_loop/terms", "selector/terms"} <= set(names)
     for topic in map(by_name, names):
@@ -270,7 +271,8 @@ def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
     assert finished.returncode == 0, finished.stderr
     recorded = _read_with_rosbags(bag)
     stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
-    assert 150 < len(stroke) <= 377  # of 377: the computer may be busy, but does not go on
+    # Of 377: the computer may be busy, its timer then comes twice in a period; it does not go on.
+    assert 150 < len(stroke) < 400
     periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
     assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)
     strokes = [

@@ -175,7 +175,8 @@ def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unk
     if low * high > 0.0 and max(high / low, low / high) > WIDE:
         ends = sorted((math.log(low / value), math.log(high / value)))
         return Unknown(path, unit, value, ends[0], ends[1], logarithmic=True)
-    return Unknown(path, unit, abs(value), low / abs(value), high / abs(value), logarithmic=False)
+    scale = abs(value) or max(abs(low), abs(high))
+    return Unknown(path, unit, scale, low / scale, high / scale, logarithmic=False)
 
 
 def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) -> Array:

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.experiment import PRESSURE_LOWERING, Experiment
 from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
@@ -61,7 +61,7 @@ class Trial:
     @property
     def spread(self) -> Array:
         """Standard deviations of x, (k,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
     def at(self, x: Array) -> "Trial":
         """Return the trial with other parameters, (k,)."""
@@ -161,9 +161,14 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole.
 
     In the end with slopes of the free run itself, over short steps: near the optimum the coarse
-    ones point a little beside it.
+    ones point a little beside it. Where no sensor shows p_S, the middle of what it may be at rest
+    is too far off to begin at.
     """
-    x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
+    shown = PRESSURE_LOWERING in evidence.measured
+    rest = [
+        np.zeros(2) if shown else _settled(known.machine, e, evidence) for e in evidence.experiments
+    ]
+    x = np.concatenate([known.x, *rest])
     problem = _free_run_problem(known, evidence, 1.0, x)
     near = fit(problem, ACCURACY)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
@@ -279,6 +284,11 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
     Inside what the sensors leave open at rest, those with the least error over the first seconds;
     the machine is left as it is.
     """
+    return Starts(experiment, evidence).at(_settled(machine, experiment, evidence)[None])[0]
+
+
+def _settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
+    """Return the state `at_rest` as the two numbers of `Starts`."""
     early, starts = experiment.until(SETTLING), Starts(experiment, evidence)
 
     def model(points: Array) -> Array:
@@ -288,8 +298,8 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
     none = np.zeros(2, dtype=bool)
     problem = Problem(model, np.zeros(2), -np.ones(2), np.ones(2), none)
     if not np.all(np.isfinite(model(np.zeros((1, 2))))):
-        return starts.at(np.zeros((1, 2)))[0]
-    return starts.at(fit(problem, ACCURACY).x[None])[0]
+        return np.zeros(2)
+    return fit(problem, ACCURACY).x
 
 
 def _free_run_errors(

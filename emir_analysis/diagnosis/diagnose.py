@@ -34,7 +34,7 @@ from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
-LEFT = 1.05  # the same of effects, after the last fit, from which on a further one is looked for
+LEFT = 1.03  # the same of all signals together, from which on a further effect is looked for
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
@@ -256,9 +256,12 @@ class _Search:
         )
 
     def _excess(self, tried: Trial) -> float:
-        """Return the largest mean square of a free-run error beyond the noise, in its units."""
+        """Return the mean square of all signals' free-run errors beyond the noise, in its units.
+
+        Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
+        """
         errors = np.concatenate(free_run_errors(tried.machine, self._evidence))
-        return float(np.max(rms(errors)) ** 2 - 1.0)
+        return float(np.mean(errors**2) - 1.0)
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)

@@ -16,10 +16,11 @@ from emir_plant.record import record
 COMMAND = "valve_command"
 ANGLE = "joint_angle"
 STROKE = "piston_stroke"
+PRESSURE_LOWERING = "pressure_lowering"
 OUTPUTS = {  # what a free run is compared with, in this order, and its unit
     STROKE: "m",
     "pressure_lifting": "Pa",
-    "pressure_lowering": "Pa",
+    PRESSURE_LOWERING: "Pa",
     "tip_deflection_angle": "rad",
 }
 SIGNALS = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS

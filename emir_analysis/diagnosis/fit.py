@@ -38,7 +38,10 @@ class Problem:
 
 @dataclass(frozen=True)
 class Solution:
-    """x: (k,). covariance: (k, k) from the curvature at the optimum. misfit: RMS residual."""
+    """x: (k,). covariance: (k, k) from the curvature at the optimum. misfit: RMS residual.
+
+    The variance of what the residuals do not depend on is infinite.
+    """
 
     x: Array
     covariance: Array
@@ -80,6 +83,9 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     inverse = np.linalg.pinv(curvature.T @ curvature)
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
+    covariance = inverse * excess
+    untold = np.flatnonzero(~np.any(curvature, axis=0))
+    covariance[untold, untold] = np.inf
     return Solution(
-        np.asarray(result.x), inverse * excess, math.sqrt(2.0 * result.cost / result.fun.size)
+        np.asarray(result.x), covariance, math.sqrt(2.0 * result.cost / result.fun.size)
     )

@@ -267,7 +267,8 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
 def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, ...]]:
     """Return with which other parameters' values each one's goes up or down."""
     spread = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    correlation = np.nan_to_num(covariance / np.outer(spread, spread))
+    with np.errstate(invalid="ignore"):  # of what the data do not tell the spread is infinite
+        correlation = np.nan_to_num(covariance / np.outer(spread, spread))
     return {
         path: tuple(
             other for j, other in enumerate(paths) if j != k and abs(correlation[k, j]) > CONFOUNDED

@@ -64,6 +64,17 @@ def balances_of(machine: Machine, commands: recorded.Array, truth: recorded.Arra
     return Balances(experiment("run", Recording(signals, 0), machine), machine)
 
 
+def test_a_stroke_that_no_sensor_shows_is_the_angles(machine: Machine) -> None:
+    truth = recorded.simulate(machine, recorded.moves(12.0, seed=5))
+    sensors = recorded.measured(machine, truth, seed=5)
+    command = Signal("valve_command", np.array([0.0, 1.0]), np.array([0.0, 0.4]), "1")
+    angle = Signal("joint_angle", *sensors["joint_states"], "rad")
+    run = experiment("run", Recording({"valve_command": command, "joint_angle": angle}, 0), machine)
+    stroke = sensors["cylinder"][1]
+    assert run.outputs[:, 0] == pytest.approx(stroke[: run.angle.size], abs=1e-9)
+    assert "piston_stroke" not in run.measured
+
+
 def rms(missing: recorded.Array) -> dict[str, float]:
     return dict(zip(BALANCES, np.sqrt(np.mean(missing**2, axis=0)), strict=True))
 

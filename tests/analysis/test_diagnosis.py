@@ -1,6 +1,7 @@
 """Machines that another integrator simulated, with effects written a second time."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -137,6 +138,18 @@ def test_an_effect_outside_the_registry_is_called_unexplained(
     assert result.balances["force"].after > 10.0 * result.balances["force"].noise
     quiet = result.balances["lifting_chamber"]
     assert quiet.after < 1.5 * quiet.noise
+
+
+def test_a_sheet_without_tolerances_is_taken_at_its_word(folder: Path, tmp_path: Path) -> None:
+    exact = re.sub(r".*{tol: .*\n|, tol: [0-9.]+", "", recorded.DATA_SHEET)
+    (tmp_path / "datasheet.yaml").write_text(exact)
+    sheet = load_sheet(tmp_path / "datasheet.yaml")
+    assert not sheet.tolerances
+    recorded.record_machine(tmp_path / "a", sheet.machine, 12.0, seed=3)
+    files = tmp_path / "datasheet.yaml", folder / "signals.yaml"
+    result = command(tmp_path / "a", *files, None, None, tmp_path / "a.html", lambda _: None)
+    assert result.verdict == "nothing_missing", summary(result)
+    assert result.parameters == {}
 
 
 def test_values_are_set_by_path(built: Machine) -> None:

@@ -4,12 +4,20 @@ import math
 
 import numpy as np
 import pytest
+import recorded
 
+from emir_analysis.diagnosis.balances import sensed
+from emir_analysis.diagnosis.candidates import fit_balances, trial
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
-from emir_analysis.diagnosis.screening import swings
+from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.screening import screen, swings
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
+from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
@@ -56,3 +64,39 @@ def test_a_robust_fit_goes_on_after_steps_that_were_too_long() -> None:
     begin, low, high = np.array([0.2115, 1.6]), np.zeros(2), np.array([10.0, 6.3])
     found = fit(Problem(model, begin, low, high, free), 1e-3, robust=True)
     assert found.x == pytest.approx([0.214, 1.6], abs=5e-5)
+
+
+def recorded_run(machine: Machine) -> Experiment:
+    """Return a run of a machine as its sensors show it."""
+    held = round(recorded.COMMAND_PERIOD / COMMAND_STEP)
+    commands = np.repeat(recorded.moves(16.0, seed=5), held)
+    period = 10 * COMMAND_STEP
+    samples = commands.size // 10 + 1
+    empty = Experiment("run", period, commands, np.zeros(samples), np.zeros((samples, 4)), 20)
+    return sensed(empty, machine, free_runs([machine], empty, [(0.8, 20e5)])[0])
+
+
+def test_an_effect_that_shows_only_when_it_is_large_is_seen() -> None:
+    """A droop of the supply is felt only where the pressure left is short: a trial size makes none.
+
+    The load takes some 100 bar, the balance 8, so that a droop of 15 bar changes nothing.
+    """
+    stated = joint1()
+    droop = {"effects.supply_pressure_droop.resistance": 1.9e10}
+    evidence = Evidence([recorded_run(with_values(stated, droop))], stated)
+    floor = evidence.floor(stated)
+    sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
+    plain = fit_balances(trial(sheet, ()), evidence, floor)
+    first = screen(plain, sheet, evidence, floor)[0].trial
+    assert first.name == "supply_pressure_droop"
+    assert first.machine.effects.supply_pressure_droop.resistance == pytest.approx(1.9e10, rel=0.1)
+
+
+def test_what_the_residuals_do_not_depend_on_stays_unknown() -> None:
+    def model(points: Array) -> Array:
+        return np.array([x[0] * TIME - 2.0 * TIME for x in points])
+
+    free = np.zeros(2, dtype=bool)
+    found = fit(Problem(model, np.ones(2), np.zeros(2), np.full(2, 9.0), free), 1e-6)
+    assert found.covariance[0, 0] == pytest.approx(1.0 / np.sum(TIME**2), rel=1e-3)
+    assert found.covariance[1, 1] == math.inf

@@ -135,6 +135,15 @@ def test_the_evidence_is_the_integral_over_what_is_expected(folder: Path) -> Non
     assert found.evidence == pytest.approx(whole, abs=0.05)
 
 
+def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None:
+    sheet, record = _one_unknown(folder)
+    own = actuator.simulate(sheet.machine, record.opening, record.period)
+    found = fit(sheet, (), replace(record, pressure=own))
+    assert found.rms == 0.0
+    assert found.machine == sheet.machine
+    assert np.isfinite(found.evidence)
+
+
 def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     record = replace(record, opening=0.2 * record.opening, pressure=0.2 * record.pressure)

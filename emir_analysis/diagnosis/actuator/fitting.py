@@ -32,6 +32,7 @@ TYPICAL = 2.0  # deviation of an effect's parameter from its trial value, in tri
 TYPICAL_FACTOR = 4.0  # the same where it is fitted as its logarithm
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
 GUESSED = 0.1  # rms error before the first fit, in spreads of the pressure
+EXACT = 1e-6  # of the spread: an rms error below is none
 ROUNDS = 2  # of fits with the rms error that the one before has left
 PLACES = 60  # drawn at random; the best of them are further starts
 
@@ -101,6 +102,73 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
     return tuple(found)
 
 
+class _Surplus:
+    """Errors, and what the parameters deviate from what is expected, in units of both.
+
+    Half the square of it all is minus the logarithm of the machine's probability.
+    """
+
+    def __init__(
+        self,
+        sheet: ActuatorSheet,
+        members: tuple[Unknown, ...],
+        record: ActuatorRecord,
+        seen: Mask | None,
+    ) -> None:
+        self.members = members
+        self.low, self.high, self.expected, self.deviation = (
+            np.array([getattr(member, name) for member in members])
+            for name in ("low", "high", "expected", "deviation")
+        )
+        self._record = record
+        self._part = slice(None) if seen is None else seen
+        self._measured = record.pressure[self._part]
+        slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
+        self.independent = INDEPENDENT * self._measured.size / slow
+        self._parameters = flat_record(sheet.machine)
+        self._places = [field(member.path) for member in members]
+
+    def _error(self, x: Array) -> Array:
+        for place, member, v in zip(self._places, self.members, x, strict=True):
+            self._parameters[place] = member.value(float(v))
+        r = self._record
+        simulated = run(self._parameters, r.opening, r.period, float(r.pressure[0]))
+        return np.asarray(simulated[self._part] - self._measured)
+
+    def rms(self, x: Array) -> float:
+        """Return the rms error."""
+        return math.sqrt(float(np.mean(self._error(x) ** 2)))
+
+    def at(self, x: Array, rms: float) -> Array:
+        """Return deviations and errors; rms: the error that is expected."""
+        weight = math.sqrt(self.independent / self._measured.size) / rms
+        return np.concatenate([(x - self.expected) / self.deviation, weight * self._error(x)])
+
+    def _jacobian(self, x: Array, rms: float) -> Array:
+        here = self.at(x, rms)
+        steps = np.where(x + STEP > self.high, -STEP, STEP)
+        moved = x + np.diag(steps)
+        columns = [(self.at(row, rms) - here) / s for row, s in zip(moved, steps, strict=True)]
+        return np.stack(columns, 1)
+
+    def _inside(self, x: Array) -> Array:
+        margin = 1e-6 * (self.high - self.low)
+        return np.clip(x, self.low + margin, self.high - margin)
+
+    def drawn(self, rms: float) -> list[Array]:
+        """Return places drawn from what is expected, the same every time, the best first."""
+        random = np.random.default_rng(0).standard_normal((PLACES, self.expected.size))
+        places = self._inside(self.expected + self.deviation * random)
+        return sorted(places, key=lambda x: float(np.sum(self.at(x, rms) ** 2)))
+
+    def least(self, start: Array, rms: float) -> OptimizeResult:
+        """Return the minimum that is reached from a place."""
+        return least_squares(
+            self.at, self._inside(start), jac=self._jacobian, args=(rms,),
+            bounds=(self.low, self.high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
+        )  # fmt: skip
+
+
 def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     sheet: ActuatorSheet,
     effects: tuple[str, ...],
@@ -113,69 +181,30 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
 
     Starts are what is expected, each known machine (effects that it lacks at their trial values),
-    and the best `drawn` of places drawn from what is expected, the same every time.
+    and the best `drawn` of places drawn from what is expected.
     """
     members = unknowns(sheet, effects)
-    low, high, expected, deviation = (
-        np.array([getattr(member, name) for member in members])
-        for name in ("low", "high", "expected", "deviation")
-    )
-    part = slice(None) if seen is None else seen
-    measured = record.pressure[part]
-    slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
-    independent = INDEPENDENT * measured.size / slow
-    parameters = flat_record(sheet.machine)
-    places = [field(member.path) for member in members]
-
-    def error(x: Array) -> Array:
-        for place, member, v in zip(places, members, x, strict=True):
-            parameters[place] = member.value(float(v))
-        simulated = run(parameters, record.opening, record.period, float(record.pressure[0]))
-        return np.asarray(simulated[part] - measured)
-
-    def surplus(x: Array, rms: float) -> Array:
-        """Return errors and deviations in units of what is expected of them."""
-        weight = math.sqrt(independent / measured.size) / rms
-        return np.concatenate([(x - expected) / deviation, weight * error(x)])
-
-    def jacobian(x: Array, rms: float) -> Array:
-        here = surplus(x, rms)
-        steps = np.where(x + STEP > high, -STEP, STEP)
-        moved = x + np.diag(steps)
-        columns = [(surplus(row, rms) - here) / s for row, s in zip(moved, steps, strict=True)]
-        return np.stack(columns, 1)
-
-    def solve(start: Array, rms: float) -> OptimizeResult:
-        return least_squares(
-            surplus, np.clip(start, inner_low, inner_high), jac=jacobian, args=(rms,),
-            bounds=(low, high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
-        )  # fmt: skip
-
-    margin = 1e-6 * (high - low)
-    inner_low, inner_high = low + margin, high - margin
-    rms = GUESSED * float(np.std(record.pressure))
-    random = np.random.default_rng(0)
-    drawings = expected + deviation * random.standard_normal((PLACES, expected.size))
-    drawings = np.clip(drawings, inner_low, inner_high)
-    further = sorted(drawings, key=lambda x: _square(surplus(x, rms))) if drawn else []
-    starts = [expected, *(_start(members, effects, machine) for machine in known)]
-    solved = [solve(start, rms) for start in (*starts, *further[:drawn])]
-    best = min(solved, key=lambda found: float(found.cost))
+    surplus = _Surplus(sheet, members, record, seen)
+    spread = float(np.std(record.pressure))
+    rms = GUESSED * spread
+    starts = [surplus.expected, *(_start(members, effects, machine) for machine in known)]
+    if drawn:
+        starts += surplus.drawn(rms)[:drawn]
+    best = min((surplus.least(x, rms) for x in starts), key=lambda found: float(found.cost))
     for _ in range(ROUNDS):
-        rms = math.sqrt(_square(error(best.x)) / measured.size)
-        best = solve(best.x, rms)
-    x = np.asarray(best.x)
+        rms = max(surplus.rms(best.x), EXACT * spread)
+        best = surplus.least(best.x, rms)
     curvature = best.jac.T @ best.jac  # of the logarithm of the probability
-    narrower = np.linalg.slogdet(deviation[:, None] * curvature * deviation)[1]
-    values = {m.path: m.value(float(v)) for m, v in zip(members, x, strict=True)}
+    narrower = np.linalg.slogdet(surplus.deviation[:, None] * curvature * surplus.deviation)[1]
+    values = {m.path: m.value(float(v)) for m, v in zip(members, best.x, strict=True)}
     return Fitted(
         effects,
         members,
         with_values(sheet.machine, values),
-        x,
+        np.asarray(best.x),
         np.linalg.inv(curvature),
-        math.sqrt(_square(error(x)) / measured.size),
-        -float(best.cost) - independent * math.log(rms) - 0.5 * float(narrower),
+        surplus.rms(best.x),
+        -float(best.cost) - surplus.independent * math.log(rms) - 0.5 * float(narrower),
     )
 
 
@@ -227,7 +256,3 @@ def _trial(path: str) -> float:
 def _is_on(machine: Actuator, effect: str) -> bool:
     members = getattr(machine.effects, effect)
     return any(getattr(members, size) != 0.0 for size in members.sizes)
-
-
-def _square(values: Array) -> float:
-    return float(values @ values)

@@ -207,15 +207,15 @@ def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) 
 class Starts:
     """States of rest at the start of a recording that the sensors leave open.
 
-    Two numbers from -1 to 1: the angle within the resolver's step and p_S within its noise, or
-    within what lets the boom rest where no sensor shows it.
+    Two numbers from -1 to 1: the angle within the resolver's step and p_S within twice its noise,
+    or within what lets the boom rest where no sensor shows it.
     """
 
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
         sensors = evidence.stated.sensors
         angle, pressure = experiment.start()
         half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
-        half_range = sensors.pressure_noise
+        half_range = 2.0 * sensors.pressure_noise
         if np.isnan(pressure):
             low, high = _resting_pressures(evidence.stated, angle)
             pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)

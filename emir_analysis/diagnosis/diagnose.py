@@ -96,6 +96,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor = evidence.floor(final.machine)
     good = quiet(level(after), floor) and explained(free_run_errors(final.machine, evidence))
     verdict = _verdict(final, len(best) - 1, convincing=good)
+    if verdict == "nothing_missing":
+        refitted = final = search.whole(final)
     if verdict == "unexplained":
         final, after = refitted, unaided
         floor = evidence.floor(final.machine)

@@ -86,7 +86,7 @@ class Findings:
 def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
     """Find out from recordings of one machine what its data sheet lacks."""
     evidence = Evidence(experiments, sheet.machine)
-    search = _Search(evidence, sheet, progress)
+    search = Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
     final = search.whole(chosen) if chosen.effects else refitted
@@ -120,7 +120,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     )
 
 
-class _Search:
+class Search:
     """Forward selection, then backward elimination.
 
     Effects are added one at a time, as long as the unseen part gets better; then those go without
@@ -170,7 +170,7 @@ class _Search:
             better = self._better(self._on_balances(self._pairs(plain, best), best), best)
             if better:
                 equal = rivals([t.trial for t in better], [_free(t) for t in better])
-        needed = self._needed(equal[0])
+        needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
 
     def whole(self, chosen: Trial) -> Trial:
@@ -196,7 +196,7 @@ class _Search:
                 best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
         return best
 
-    def _needed(self, chosen: Trial) -> Trial:
+    def needed(self, chosen: Trial) -> Trial:
         """Return a trial without the effect that is least needed, if one is not."""
         if not chosen.effects or not self._enough(self.whole(chosen)):
             return chosen
@@ -211,7 +211,7 @@ class _Search:
             fitted = min(fitted, known, key=self._on_whole)
             if self._on_whole(fitted) < least and self._enough(fitted):
                 self._whole[fewer.effects] = fitted
-                return self._needed(fitted)
+                return self.needed(fitted)
         return chosen
 
     def _on_whole(self, fitted: Trial) -> float:

@@ -171,7 +171,8 @@ class RecorderNode(Shell):
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data
-        self._write_complete_stamps()
+        if stamp == self._next:
+            self._write_complete_stamps()
 
     def _write_complete_stamps(self) -> None:
         while self._described and self._is_complete(self._next):

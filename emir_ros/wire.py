@@ -32,7 +32,8 @@ _MARK = -1.2345678912345678e-123  # times the signal's number
 def stamp_ns(data: bytes) -> int:
     """Return the header stamp, ns, of any serialized message that begins with a header."""
     sec, nanosec = STAMP.unpack_from(data)
-    return int(sec) * NANOSECONDS + int(nanosec)
+    stamp: int = sec * NANOSECONDS + nanosec
+    return stamp
 
 
 def clock_message(stamp: int) -> bytes:

@@ -91,9 +91,12 @@ class Wire:
             return None
         form, blank, places, at = "<4siI", [data[:4], 0, 0], [], STAMP.size
         for place, name in found:
-            form += f"{place - at}sd"
-            places.append((name, len(blank) + 1))
-            blank += [data[at:place], 0.0]
+            if place > at:
+                form += f"{place - at}s"
+                blank.append(data[at:place])
+            form += "d"
+            places.append((name, len(blank)))
+            blank.append(0.0)
             at = place + 8
         return struct.Struct(f"{form}{len(data) - at}s"), [*blank, data[at:]], places
 

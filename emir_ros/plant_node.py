@@ -20,7 +20,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
-from emir_ros.wire import Wire, clock_message, stamp_ns
+from emir_ros.wire import Wire, clock_message, publish_bytes, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -116,7 +116,7 @@ class PlantNode(Shell):
 
     def _publish_tick(self) -> None:
         self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
-        self._clock_publisher.publish(clock_message(stamp))
+        publish_bytes(self._clock_publisher, clock_message(stamp))
         self._publish_sensors(stamp)
 
     def _on_recorded(self, data: bytes) -> None:

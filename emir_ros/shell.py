@@ -37,7 +37,7 @@ from emir_ros import qos
 from emir_ros.diagnostics import Beat, Diagnostics, Level
 from emir_ros.node_parameters import declare
 from emir_ros.orders import Orders
-from emir_ros.wire import Wire, stamp_ns
+from emir_ros.wire import Wire, publish_bytes, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
@@ -155,13 +155,9 @@ class Shell(LifecycleNode):
         )
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
-        """Publish a topic's signals, stamped in ns.
-
-        By the publisher's handle: what `Publisher.publish` does besides, to guard the handle and to
-        tell bytes from messages, takes longer than sending.
-        """
+        """Publish a topic's signals, stamped in ns."""
         _, wire, publisher = self._outputs[topic.name]
-        publisher.handle.publish_raw(wire.encode(stamp, signals))
+        publish_bytes(publisher, wire.encode(stamp, signals))
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any

@@ -247,14 +247,16 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
         left = h
         while left > 0.0:
-            left -= _step(x, arriving, left, p, work)
+            left -= _step(x, arriving, left, h, p, work)
 
 
 @compiled
-def _step(x: Array, command: float, longest: float, p: Any, work: Array) -> float:
+def _step(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, longest: float, usual: float, p: Any, work: Array
+) -> float:
     """Advance x in place by one step of Runge-Kutta 4, up to `longest`, s; return the step, s."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
-    dry = _write_first_rates(x, command, longest, p, k1)
+    dry = _write_first_rates(x, command, longest, usual, p, k1)
     h = dry.step
     _write_sum(x, 0.5 * h, k1, p, between)
     _write_later_rates(between, command, dry, p, k2)
@@ -281,8 +283,8 @@ def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
 
 
 @compiled
-def _write_first_rates(
-    x: Array, command: float, longest: float, p: Any, dx: Array
+def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, longest: float, usual: float, p: Any, dx: Array
 ) -> dry_friction.Friction:
     """Write dx/dt at the start of a step of up to `longest`, s; return its dry friction."""
     n = p.mode_joint.size
@@ -298,6 +300,7 @@ def _write_first_rates(
         motion.arm * motion.arm * admittance,
         motion.force,
         longest,
+        usual,
         p,
     )
     for i in range(n):

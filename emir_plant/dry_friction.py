@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 from emir_plant.effects import terms
 from emir_plant.jit import compiled
 
-SHORTEST = 3e-5  # s, of a step
-CHANGE = 3e-5  # m/s, of the velocity by the change of friction over a step: 1e-3 of a fast motion
+SHORTEST = 0.125  # of the usual step
+CHANGE = 0.12  # m/s^2: by the change of friction over a step, per usual step; 3e-5 m/s in 0.25 ms
 GENTLE = 0.5  # share of the change of velocity, below which a step of Runge-Kutta is accurate
 ITERATIONS = 60  # of the search; it takes about ten, sliding two
 TOLERANCE = 1e-12  # m/s
@@ -37,17 +37,23 @@ class Friction(NamedTuple):
 
 @compiled
 def over_step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
-    velocity: float, acceleration: float, mobility: float, load: float, longest: float, p: Any
+    velocity: float,
+    acceleration: float,
+    mobility: float,
+    load: float,
+    longest: float,
+    usual: float,
+    p: Any,
 ) -> Friction:
     """Return the dry friction of the longest step that is accurate, up to `longest`, s.
 
-    velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
+    usual: step where nothing changes fast, s. velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
     load: force of the oil on the piston, N.
     """
     before = terms.dry_friction(velocity, load, p)
     step = longest
     after, change = _end(velocity, acceleration, mobility, load, step, before, p)
-    while change > CHANGE and step > SHORTEST:
+    while change > CHANGE * usual and step > SHORTEST * usual:
         step *= 0.5
         after, change = _end(velocity, acceleration, mobility, load, step, before, p)
     moved = step * abs(acceleration - mobility * after)

@@ -157,7 +157,7 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     dx[LOGIC] = logic_block.opening_rate(x[LOGIC], pilot, p)
     dx[TIME] = 1.0
     dx[DROOP] = supply_pressure_droop.rate(x[DROOP], pumped, p)
-    dx[EDGES] = valve_hysteresis.rate(x[SPOOL], x[EDGES], p)
+    dx[EDGES] = 0.0  # `remember` moves them
     dx[OFFSET] = motion.offset_rate
     _write_lags(x, motion, p, dx)
     _write_boom(x, motion, dry, p, dx)
@@ -270,7 +270,17 @@ def _step(  # noqa: PLR0913, PLR0917 (as _advance)
         x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     x[P_H] = max(x[P_H], 0.0)
     x[P_S] = max(x[P_S], 0.0)
+    remember(x, p)
     return h
+
+
+@compiled
+def remember(x: Array, p: Any) -> None:
+    """Put the metering edges to where the spool has pushed them, at the end of a step.
+
+    Play is no differential equation: inside a step the edges are pushed from where they were.
+    """
+    x[EDGES] = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
 
 
 @compiled

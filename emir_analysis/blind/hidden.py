@@ -366,7 +366,7 @@ class ValveHysteresis(Hidden):
 
     name = "valve_hysteresis"
     grows = ("spool_play",)
-    PUSHED = 3e-4  # s, in which the edges follow the flank that pushes them
+    PUSHED = 1e-5  # s, in which the edges follow the flank that pushes them: as good as none
 
     def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
         super().__init__(numbers, sizes)

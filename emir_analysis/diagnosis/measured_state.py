@@ -72,6 +72,7 @@ def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them
     _write_rates(between, command, measured[2], parameters, k4)
     for i in range(x.size):
         x[i] += dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    core.remember(x, parameters[0])
 
 
 @compiled

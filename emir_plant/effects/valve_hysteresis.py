@@ -7,15 +7,13 @@ from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled
 
-RELAXATION = 2e-3  # s: faster than the spool, slow enough for steps of 1 ms
-
 
 @dataclass(frozen=True)
 class ValveHysteresis(Effect):
     """Play operator: the edges rest until the spool has moved by half the width to either side.
 
     A state w remembers where the edges are; the spool at y puts them to w limited to
-    y - width/2 ... y + width/2, and w follows that with RELAXATION.
+    y - width/2 ... y + width/2, which w becomes at the end of each integration step.
     """
 
     balance: ClassVar[Balance] = "valve"
@@ -33,11 +31,3 @@ def edges(spool: float, memory: float, p: Any) -> float:
         return spool
     half = 0.5 * p.valve_hysteresis_width
     return min(max(memory, spool - half), spool + half)
-
-
-@compiled
-def rate(spool: float, memory: float, p: Any) -> float:
-    """Return dw/dt, 1/s, of the remembered position w."""
-    if p.valve_hysteresis_width == 0.0:
-        return 0.0
-    return (edges(spool, memory, p) - memory) / RELAXATION

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, quantities
@@ -447,20 +448,31 @@ def test_gain_asymmetry_scales_the_flow_of_one_direction() -> None:
     assert flows[3] == pytest.approx(1.1 * flows[1])
 
 
-def test_hysteresis_is_a_play_of_its_width() -> None:
-    """The spool swings slowly: the edges follow it at half the width, and rest on reversal."""
-    width, dt = 0.04, 1e-3
-    p = _with(valve_hysteresis={"width": width}).record[0]
-    spool = 0.5 * np.sin(2.0 * math.pi * 0.1 * np.arange(20000) * dt)
-    memory, play, found, exact = 0.0, 0.0, [], []
-    for y in spool:
-        found.append(valve_hysteresis.edges(y, memory, p))
-        memory += dt * valve_hysteresis.rate(y, memory, p)
-        play = min(max(play, y - width / 2), y + width / 2)
-        exact.append(play)
-    assert np.abs(np.array(found) - exact).max() < 2e-3 * width
-    difference = spool - np.array(found)
-    assert np.ptp(difference) == pytest.approx(width)
+def test_hysteresis_is_a_play_behind_an_overshooting_spool() -> None:
+    """Against the spool's exact answer in steps of 0.01 ms, the edges pushed at half the width."""
+    width, damping, held, fine = 0.04, 0.3, 300, 100
+    values = {"effects.valve_hysteresis.width": width, "valve.damping": damping}
+    plant = Plant(with_values(joint1(), values))
+    commands = np.repeat([0.6, 0.2, 0.25, -0.5, -0.48, 0.0], held)
+    state = plant.initial(FORTY_FIVE, 20e5)
+    found = []
+    for command in commands:
+        state, _ = plant.step(state, command, core.STEP)
+        found.append(valve_hysteresis.edges(state[core.SPOOL], state[core.EDGES], plant.record[0]))
+
+    w = plant.record["natural_frequency"][0]
+    given = np.repeat(commands, fine)
+    time = np.arange(given.size + 1) * core.STEP / fine
+    spool = signal.TransferFunction([w**2], [1.0, 2.0 * damping * w, w**2])
+    _, swung, _ = signal.lsim(spool, np.append(given, 0.0), time, interp=False)
+    edges, exact = 0.0, []
+    for y in swung[1:]:
+        edges = min(max(edges, y - 0.5 * width), y + 0.5 * width)
+        exact.append(edges)
+    error = np.abs(np.array(found) - exact[fine - 1 :: fine])
+    overshoot = 0.7 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
+    assert error.max() < overshoot * (w * core.STEP) ** 2 / 8.0  # turned back within a step
+    assert abs(found[-1]) > 10.0 * error[-1]  # where the last command was 0
 
 
 def test_hysteresis_gives_two_speeds_for_one_command() -> None:

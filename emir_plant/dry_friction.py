@@ -47,8 +47,8 @@ def over_step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle 
 ) -> Friction:
     """Return the dry friction of the longest step that is accurate, up to `longest`, s.
 
-    usual: step where nothing changes fast, s. velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
-    load: force of the oil on the piston, N.
+    velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
+    load: force of the oil on the piston, N. usual: step where nothing changes fast, s.
     """
     before = terms.dry_friction(velocity, load, p)
     step = longest

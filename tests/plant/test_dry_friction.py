@@ -92,15 +92,15 @@ def test_stick_and_slip_that_keeps_up_a_bending_mode_agrees_with_a_stiff_solver(
 def test_a_step_is_short_only_where_friction_turns_round() -> None:
     p, longest = _with_friction(2e4, 1e-4).record[0], 1e-3
     weight = 1e-4  # 1/kg, of the piston
-    sliding = dry_friction.over_step(0.02, 1.0, weight, 6e5, longest, p)
+    sliding = dry_friction.over_step(0.02, 1.0, weight, 6e5, longest, longest, p)
     creeping = 1e-4 * math.atanh(0.5)
-    stuck = dry_friction.over_step(creeping, 1.0, weight, 6e5, longest, p)
-    turning = dry_friction.over_step(-1e-4, 5.0, weight, 6e5, longest, p)
+    stuck = dry_friction.over_step(creeping, 1.0, weight, 6e5, longest, longest, p)
+    turning = dry_friction.over_step(-1e-4, 5.0, weight, 6e5, longest, longest, p)
     assert sliding == (longest, pytest.approx(2e4), False)
     assert stuck == (longest, pytest.approx(1.0 / weight, rel=1e-3), True)  # it holds the load
-    assert turning.step <= dry_friction.SHORTEST
+    assert turning.step <= dry_friction.SHORTEST * longest
 
 
 def test_without_friction_nothing_changes() -> None:
     p = Plant(joint1()).record[0]
-    assert dry_friction.over_step(0.01, 20.0, 1e-4, 6e5, 1e-3, p) == (1e-3, 0.0, False)
+    assert dry_friction.over_step(0.01, 20.0, 1e-4, 6e5, 1e-3, 1e-3, p) == (1e-3, 0.0, False)

@@ -39,8 +39,9 @@ DELAY_LINE = 13  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
-FINER = 4  # times as many steps with dry friction: sticking and sliding in turn keeps up the
-# fastest mode, and the phase that Runge-Kutta loses in it then adds up over seconds
+FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging: the phase that
+# Runge-Kutta loses in it adds up over seconds and shifts the instants of sticking
+SWING = 2e-3  # m/s, amplitude of the piston in that mode from which on they are taken
 
 
 class Truth(NamedTuple):
@@ -239,8 +240,6 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
 ) -> None:
     """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
     p = parameters[0]
-    if terms.has_dry_friction(p):
-        step /= FINER
     steps = max(1, math.ceil(dt / step - 1e-9))
     h = dt / steps
     for _ in range(steps):
@@ -252,11 +251,14 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
 
 @compiled
 def _step(  # noqa: PLR0913, PLR0917 (as _advance)
-    x: Array, command: float, longest: float, usual: float, p: Any, work: Array
+    x: Array, command: float, left: float, usual: float, p: Any, work: Array
 ) -> float:
-    """Advance x in place by one step of Runge-Kutta 4, up to `longest`, s; return the step, s."""
+    """Advance x in place by one step of Runge-Kutta 4; return the step, s.
+
+    left: the most it may be, s. usual: step without dry friction, s.
+    """
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
-    dry = _write_first_rates(x, command, longest, usual, p, k1)
+    dry = _write_first_rates(x, command, left, usual, p, k1)
     h = dry.step
     _write_sum(x, 0.5 * h, k1, p, between)
     _write_later_rates(between, command, dry, p, k2)
@@ -294,28 +296,45 @@ def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
 
 @compiled
 def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
-    x: Array, command: float, longest: float, usual: float, p: Any, dx: Array
+    x: Array, command: float, left: float, usual: float, p: Any, dx: Array
 ) -> dry_friction.Friction:
-    """Write dx/dt at the start of a step of up to `longest`, s; return its dry friction."""
+    """Write dx/dt at the start of a step; return its dry friction. left, usual: as for `_step`."""
     n = p.mode_joint.size
     motion = _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
+    if not terms.has_dry_friction(p):
+        return dry_friction.Friction(left, 0.0, False)
     turning, admittance = 0.0, 0.0
     for i in range(n):
         turning += p.mode_joint[i] * dx[MODES + n + i]
         admittance += p.mode_joint[i] * p.mode_joint[i]
+    friction = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    fine = usual / FINER if usual <= STEP else usual
     dry = dry_friction.over_step(
         motion.joint_velocity,
         motion.arm * turning,
         motion.arm * motion.arm * admittance,
         motion.force,
-        longest,
-        usual,
+        min(left, fine if _swing(x, dx, motion.arm, friction, p) > SWING else usual),
+        fine,
         p,
     )
     for i in range(n):
         dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry.force
     return dry
+
+
+@compiled
+def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
+    """Return the piston's amplitude in the fastest mode, m/s.
+
+    dx: rates without the dry friction, N.
+    """
+    last = p.mode_joint.size - 1
+    moved = p.mode_joint[last] * arm
+    rate = MODES + p.mode_joint.size + last
+    acceleration = dx[rate] - moved * friction
+    return abs(moved) * math.sqrt(x[rate] ** 2 + acceleration**2 / p.mode_stiffness[last])
 
 
 @compiled

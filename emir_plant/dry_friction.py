@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 from emir_plant.effects import terms
 from emir_plant.jit import compiled
 
-SHORTEST = 0.125  # of the usual step
-CHANGE = 0.12  # m/s^2: by the change of friction over a step, per usual step; 3e-5 m/s in 0.25 ms
+SHORTEST = 0.125  # of the fine step
+CHANGE = 0.12  # m/s^2, of the velocity by the change of friction, per fine step: 3e-5 m/s
 GENTLE = 0.5  # share of the change of velocity, below which a step of Runge-Kutta is accurate
 ITERATIONS = 60  # of the search; it takes about ten, sliding two
 TOLERANCE = 1e-12  # m/s
@@ -42,39 +42,26 @@ def over_step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle 
     mobility: float,
     load: float,
     longest: float,
-    usual: float,
+    fine: float,
     p: Any,
 ) -> Friction:
     """Return the dry friction of the longest step that is accurate, up to `longest`, s.
 
     velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
-    load: force of the oil on the piston, N. usual: step where nothing changes fast, s.
+    load: force of the oil on the piston, N. fine: step, s, to which the accuracy belongs.
     """
     before = terms.dry_friction(velocity, load, p)
     step = longest
-    after, change = _end(velocity, acceleration, mobility, load, step, before, p)
-    while change > CHANGE * usual and step > SHORTEST * usual:
+    while True:
+        after = at_end(velocity + step * acceleration, step * mobility, load, p)
+        change = step * mobility * abs(after - before)
+        moved = step * abs(acceleration - mobility * after)
+        if change <= CHANGE * fine or step <= SHORTEST * fine:
+            break
         step *= 0.5
-        after, change = _end(velocity, acceleration, mobility, load, step, before, p)
-    moved = step * abs(acceleration - mobility * after)
     if change <= GENTLE * moved or change == 0.0:
         return Friction(step, before, False)
     return Friction(step, after, True)
-
-
-@compiled
-def _end(  # noqa: PLR0913, PLR0917 (as above)
-    velocity: float,
-    acceleration: float,
-    mobility: float,
-    load: float,
-    step: float,
-    before: float,
-    p: Any,
-) -> tuple[float, float]:
-    """Return the friction at the end of a step, N, and what its change does to the velocity."""
-    after = at_end(velocity + step * acceleration, step * mobility, load, p)
-    return after, step * mobility * abs(after - before)
 
 
 @compiled

@@ -164,7 +164,7 @@ class TrajectoryControl:
         motion = self._motion(state)
         ahead = motion.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
         move = dict(zip(CYLINDER_MOVE.fields, motion.move(state, dt), strict=True))
-        state, now = motion.step(state, inputs, dt)
+        state, now = motion.step(state._replace(ahead=ahead), inputs, dt)
         reference = {"reference_stroke": now.stroke, "reference_velocity": now.velocity}
         preview = dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
         return state, reference | preview | move

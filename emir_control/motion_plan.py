@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 SHORTEST = 10  # control periods
+SECANT = 1e-5  # rad, the least way over which slopes are taken: who is there has none left
 
 
 class Target(NamedTuple):
@@ -158,6 +159,9 @@ class Planner:
     def _middle(self, boom: Boom, strokes: Pair, angles: Pair) -> Drive:
         """Return the drive about the middle between two strokes, m, at angles, rad."""
         drive, linkage = self.drive, self.drive.parameters.static
+        if abs(angles[1] - angles[0]) < SECANT:
+            angles = (angles[0] - 0.5 * SECANT, angles[0] + 0.5 * SECANT)
+            strokes = (piston_stroke(angles[0], linkage), piston_stroke(angles[1], linkage))
         turn = angles[1] - angles[0]
         return Drive(
             arm=(strokes[1] - strokes[0]) / turn,

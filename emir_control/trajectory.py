@@ -103,6 +103,7 @@ class TrajectoryState(NamedTuple):
     start: float  # stroke at which it started, m
     ticks: int  # control periods since
     motion: "Motion | None" = None  # in the trajectory's place
+    ahead: tuple[float, ...] = ()  # strokes after the next step's own, m, as far as computed
 
 
 class TrajectoryInputs(NamedTuple):
@@ -136,12 +137,15 @@ class Motion:
     ) -> tuple[TrajectoryState, Reference]:
         """Return the reference of this control period of dt, s."""
         reference = self.at(state.ticks * dt, state.start)
-        return state._replace(ticks=state.ticks + 1), reference
+        return state._replace(ticks=state.ticks + 1, ahead=state.ahead[1:]), reference
 
     def ahead(self, state: TrajectoryState, count: int, dt: float) -> tuple[float, ...]:
-        """Return the strokes, m, of the `count` periods that follow the next step's own."""
-        times = ((state.ticks + k) * dt for k in range(1, count + 1))
-        return tuple(self.at(time, state.start).stroke for time in times)
+        """Return the strokes, m, of the `count` periods that follow the next step's own.
+
+        Put into the state, they are not computed a second time.
+        """
+        times = ((state.ticks + k) * dt for k in range(len(state.ahead) + 1, count + 1))
+        return state.ahead + tuple(self.at(time, state.start).stroke for time in times)
 
     def move(self, state: TrajectoryState, dt: float) -> Move:
         """Return the move under way or to come; here there is none, and long no other."""

@@ -15,6 +15,7 @@ from emir_plant import core, linkage
 from emir_plant.core import Array, Truth
 from emir_plant.effects import sensor_delay
 from emir_plant.jit import compiled
+from emir_plant.noise import generator
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 
@@ -68,7 +69,7 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
     """
     machine = plant.machine
     sensors, cylinder = machine.sensors, machine.cylinder
-    noise = np.random.default_rng((sensors.seed, sample)).standard_normal(3).tolist()
+    noise = generator(sensors.seed, sample).standard_normal(3).tolist()
     true = {
         "angle": truth.angle,
         "pressure_lifting": truth.pressure_lifting,

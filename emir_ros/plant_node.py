@@ -12,7 +12,6 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Header
 
 from emir_common.quantity import check_ranges, quantity
-from emir_msgs_py import conversions
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, RECORDED, ROBOT
 from emir_ros import qos
@@ -21,7 +20,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
-from emir_ros.wire import Wire, clock_message, stamp_ns
+from emir_ros.wire import Wire, clock_message, publish_bytes, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -109,19 +108,19 @@ class PlantNode(Shell):
         self._clock_publisher = self.create_publisher(
             ClockMessage, "/clock", qos.offered(lockstep=True)
         )
-        self.create_subscription(Header, RECORDED, self._on_recorded, qos.offered(lockstep=True))
+        profile = qos.offered(lockstep=True)
+        self.create_subscription(Header, RECORDED, self._on_recorded, profile, raw=True)
         self.create_timer(0.5, self._check_patience, clock=self._wall)
         self._asked = time.monotonic()
         self._publish_tick()
 
     def _publish_tick(self) -> None:
         self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
-        self._clock_publisher.publish(clock_message(stamp))
+        publish_bytes(self._clock_publisher, clock_message(stamp))
         self._publish_sensors(stamp)
 
-    def _on_recorded(self, message: Header) -> None:
-        stamp = message.stamp
-        self._recorded = stamp.sec * conversions.NANOSECONDS + stamp.nanosec
+    def _on_recorded(self, data: bytes) -> None:
+        self._recorded = stamp_ns(data)
         self._advance_when_answered()
 
     def _advance_when_answered(self) -> None:

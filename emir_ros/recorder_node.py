@@ -50,7 +50,7 @@ from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
 from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
-from emir_ros.wire import header_message, stamp_ns
+from emir_ros.wire import header_message, publish_bytes, stamp_ns
 
 EVENTS = 1000  # depth, as ROS has it for parameter events
 QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
@@ -171,7 +171,8 @@ class RecorderNode(Shell):
 
     def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
         self._pending.setdefault(stamp, {})[topic.name] = data
-        self._write_complete_stamps()
+        if stamp == self._next:
+            self._write_complete_stamps()
 
     def _write_complete_stamps(self) -> None:
         while self._described and self._is_complete(self._next):
@@ -180,7 +181,7 @@ class RecorderNode(Shell):
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
-                self._ack.publish(header_message(self._next))
+                publish_bytes(self._ack, header_message(self._next))
             self._next += PLANT_PERIOD_NS
 
     def _is_complete(self, stamp: int) -> bool:

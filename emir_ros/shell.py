@@ -37,7 +37,7 @@ from emir_ros import qos
 from emir_ros.diagnostics import Beat, Diagnostics, Level
 from emir_ros.node_parameters import declare
 from emir_ros.orders import Orders
-from emir_ros.wire import Wire, stamp_ns
+from emir_ros.wire import Wire, publish_bytes, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
@@ -48,6 +48,10 @@ Signals = dict[str, float]
 
 class NodeError(RuntimeError):
     """A node cannot go on; the message is one line."""
+
+
+Failure = NodeError | ParameterError | SimulationError
+FAILURES = (NodeError, ParameterError, SimulationError)
 
 
 class Shell(LifecycleNode):
@@ -71,7 +75,7 @@ class Shell(LifecycleNode):
         arguments: Sequence[str] | None = None,
         robot: Sequence[Topic] | None = None,
     ) -> None:
-        self.failure: NodeError | ParameterError | SimulationError | None = None
+        self.failure: Failure | None = None
         self.ended = Future()  # complete when the node is done or has failed
         self.active = False
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
@@ -121,8 +125,12 @@ class Shell(LifecycleNode):
         """Subscribe to a topic's messages as bytes; counts who comes and goes, and deadlines."""
 
         def take(data: bytes) -> None:
-            if self.active:
-                self._keep_failure(receive, data)
+            if not self.active:
+                return
+            try:  # not `_keep_failure`: this is done for every message
+                receive(data)
+            except FAILURES as error:
+                self._fail(error)
 
         def late(_: Any) -> None:
             self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
@@ -149,7 +157,7 @@ class Shell(LifecycleNode):
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
         _, wire, publisher = self._outputs[topic.name]
-        publisher.publish(wire.encode(stamp, signals))
+        publish_bytes(publisher, wire.encode(stamp, signals))
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
@@ -175,9 +183,12 @@ class Shell(LifecycleNode):
         """Call back; keep a failure from the executor, which would print a traceback."""
         try:
             callback(*args)
-        except (NodeError, ParameterError, SimulationError) as error:
-            self.failure = self.failure or error
-            self.end()
+        except FAILURES as error:
+            self._fail(error)
+
+    def _fail(self, error: Failure) -> None:
+        self.failure = self.failure or error
+        self.end()
 
     @property
     def done(self) -> bool:
@@ -279,6 +290,7 @@ class ControlNode(Shell):
         self._held: dict[str, Signals] = {}  # what comes less often than this node acts
         self._own = name.removesuffix("_node")
         self._inputs: dict[str, Topic] = {}
+        self._fast_inputs = 0  # how many of them come every plant period
         about = "an older input is stale [s], real time"
         self._timeout = Duration(seconds=declare(self, "input_timeout", self.timeout, about))
         self._latest: dict[str, tuple[Time, Signals]] = {}
@@ -347,6 +359,7 @@ class ControlNode(Shell):
     def take(self, topic: Topic, later: int = 0) -> None:
         """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
         self._inputs[topic.name] = topic
+        self._fast_inputs += topic.every == "plant"
         wire = Wire(topic)
 
         def receive_latest(data: bytes) -> None:
@@ -376,8 +389,7 @@ class ControlNode(Shell):
 
     def _expected(self, stamp: int) -> int:
         """Return how many of the inputs have messages of that stamp."""
-        controlled = stamp % CONTROL_PERIOD_NS == 0
-        return sum(controlled or topic.every == "plant" for topic in self._inputs.values())
+        return len(self._inputs) if stamp % CONTROL_PERIOD_NS == 0 else self._fast_inputs
 
     def _on_timer(self) -> None:
         now = self.get_clock().now()

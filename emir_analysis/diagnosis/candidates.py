@@ -67,6 +67,22 @@ class Trial:
         """Return the trial with other parameters, (k,)."""
         return Trial(self.effects, self.unknowns, x, self.covariance)
 
+    def without(self, effect: str) -> "Trial":
+        """Return the trial with one effect less."""
+        others = tuple(name for name in self.effects if name != effect)
+        gone = [u.path for u in self.unknowns.members if u.path.startswith(f"effects.{effect}.")]
+        return replace(self._less(gone), effects=others)
+
+    def with_one_size(self, effect: str, size: str) -> "Trial":
+        """Return the trial with the other sizes of an effect at 0, no longer to be fitted."""
+        return self._less([f"effects.{effect}.{s}" for s in REGISTRY[effect].sizes if s != size])
+
+    def _less(self, paths: Sequence[str]) -> "Trial":
+        kept = np.array([u.path not in paths for u in self.unknowns.members], dtype=bool)
+        members = tuple(u for u, stays in zip(self.unknowns.members, kept, strict=True) if stays)
+        left = Unknowns(self.unknowns.machine, members)
+        return Trial(self.effects, left, self.x[kept], self.covariance[np.ix_(kept, kept)])
+
     def continued(self, solution: Solution) -> "Trial":
         """Return the trial with the parameters of a further fit."""
         k = len(self.unknowns.members)
@@ -74,10 +90,14 @@ class Trial:
 
 
 def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) -> Trial:
-    """Return a trial at its starting values, or at those of a trial fitted before."""
-    members = unknowns(sheet, effects)
-    fitted = {} if known is None else dict(zip(known.unknowns.members, known.x, strict=True))
-    x = np.array([fitted.get(unknown, unknown.start) for unknown in members.members])
+    """Return a trial at its starting values, or a trial fitted before with the further effects."""
+    if known is None:
+        members = unknowns(sheet, effects)
+        x = members.start
+    else:
+        new = unknowns(replace(sheet, tolerances={}), effects[len(known.effects) :])
+        members = Unknowns(sheet.machine, (*known.unknowns.members, *new.members))
+        x = np.append(known.x, new.start)
     return Trial(effects, members, x, np.full((x.size, x.size), np.nan))
 
 
@@ -162,7 +182,7 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
 
     In the end with slopes of the free run itself, over short steps: near the optimum the coarse
     ones point a little beside it. Where no sensor shows p_S, the middle of what it may be at rest
-    is too far off to begin at.
+    is too far off to begin at. A hopeless trial is not polished.
     """
     shown = PRESSURE_LOWERING in evidence.measured
     rest = [
@@ -171,6 +191,8 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     x = np.concatenate([known.x, *rest])
     problem = _free_run_problem(known, evidence, 1.0, x)
     near = fit(problem, ACCURACY)
+    if near.misfit > HOPELESS:
+        return known.continued(near)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
     return known.continued(fit(fine, FINE_ACCURACY))
 
@@ -207,15 +229,15 @@ def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) 
 class Starts:
     """States of rest at the start of a recording that the sensors leave open.
 
-    Two numbers from -1 to 1: the angle within the resolver's step and p_S within its noise, or
-    within what lets the boom rest where no sensor shows it.
+    Two numbers from -1 to 1: the angle within the resolver's step and p_S within twice its noise,
+    or within what lets the boom rest where no sensor shows it.
     """
 
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
         sensors = evidence.stated.sensors
         angle, pressure = experiment.start()
         half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
-        half_range = sensors.pressure_noise
+        half_range = 2.0 * sensors.pressure_noise
         if np.isnan(pressure):
             low, high = _resting_pressures(evidence.stated, angle)
             pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)

@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
 from emir_analysis.diagnosis.select import (
+    EXPLAINED,
     SEEN,
     SPEAKS,
     STRONG,
@@ -31,6 +32,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
@@ -84,7 +86,7 @@ class Findings:
 def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
     """Find out from recordings of one machine what its data sheet lacks."""
     evidence = Evidence(experiments, sheet.machine)
-    search = _Search(evidence, sheet, progress)
+    search = Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
     final = search.whole(chosen) if chosen.effects else refitted
@@ -96,6 +98,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor = evidence.floor(final.machine)
     good = quiet(level(after), floor) and explained(free_run_errors(final.machine, evidence))
     verdict = _verdict(final, len(best) - 1, convincing=good)
+    if verdict == "nothing_missing":
+        refitted = final = search.whole(final)
     if verdict == "unexplained":
         final, after = refitted, unaided
         floor = evidence.floor(final.machine)
@@ -116,8 +120,11 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     )
 
 
-class _Search:
-    """Forward selection: effects are added one at a time, as long as the unseen part gets better.
+class Search:
+    """Forward selection, then backward elimination.
+
+    Effects are added one at a time, as long as the unseen part gets better; then those go without
+    which the whole is explained as well.
 
     tried: all trials. balanced, refitted: the parameters alone, fitted to the balances and to the
     free run of the whole recordings.
@@ -146,12 +153,14 @@ class _Search:
         )
         best = plain
         self.tried, equal, enough = [best], [best.trial], False
+        before: dict[tuple[str, ...], list[Trial]] = {(): equal}
         while len(best.trial.effects) < MOST_EFFECTS:
             self._progress(f"all effects beside: {best.trial.name}")
             better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
+            before[equal[0].effects] = equal
             best = self._known_whole(min(better, key=_free))
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
@@ -161,14 +170,52 @@ class _Search:
             better = self._better(self._on_balances(self._pairs(plain, best), best), best)
             if better:
                 equal = rivals([t.trial for t in better], [_free(t) for t in better])
-        return equal
+        needed = self.needed(equal[0])
+        return equal if needed is equal[0] else before.get(needed.effects, [needed])
 
     def whole(self, chosen: Trial) -> Trial:
         """Return a trial fitted to the free run of the whole recordings."""
         if chosen.effects not in self._whole:
             self._progress(f"fitting to the whole recording: {chosen.name}")
-            self._whole[chosen.effects] = refine_free_run(chosen, self._evidence)
+            fitted = refine_free_run(chosen, self._evidence)
+            if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
+                fitted = self._with_fewer_sizes(fitted)
+            self._whole[chosen.effects] = fitted
         return self._whole[chosen.effects]
+
+    def _with_fewer_sizes(self, full: Trial) -> Trial:
+        """Return a trial with one size of its effects alone where that is better than with all.
+
+        Beside another that explains nothing a size may not find its way.
+        """
+        best = full
+        for effect in full.effects:
+            sizes = REGISTRY[effect].sizes
+            if len(sizes) > 1:
+                alone = min((best.with_one_size(effect, s) for s in sizes), key=self._on_whole)
+                best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
+        return best
+
+    def needed(self, chosen: Trial) -> Trial:
+        """Return a trial without the effect that is least needed, if one is not."""
+        if not chosen.effects or not self._enough(self.whole(chosen)):
+            return chosen
+        least = self._on_whole(self.whole(chosen)) + STRONG
+        for effect in chosen.effects:
+            fewer = self.whole(chosen).without(effect)
+            if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
+                continue
+            self._progress(f"fitting without: {effect}")
+            fitted = refine_free_run(fewer, self._evidence)
+            known = self._whole.get(fewer.effects, fitted)
+            fitted = min(fitted, known, key=self._on_whole)
+            if self._on_whole(fitted) < least and self._enough(fitted):
+                self._whole[fewer.effects] = fitted
+                return self.needed(fitted)
+        return chosen
+
+    def _on_whole(self, fitted: Trial) -> float:
+        return free_run_score(fitted, self._evidence, seen=0.0)
 
     def _known_whole(self, best: Tried) -> Tried:
         """Return a trial as the whole recordings have it, if it is near them.

@@ -232,14 +232,16 @@ def _starts(
 ) -> list[Array]:
     """Return vectors, (k,), of the effect's fields from which a fit may start.
 
+    Of several sizes all together, and each alone: together one may hide what another explains.
     force: missing in the first recording, (w,) N. size: of the effect, in trial sizes.
     """
     x = np.array([unknown.start for unknown in members])
     if effect == "external_load":
         return [x, *_loads_over_time(members, force, evidence)]
-    sizes = [u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members]
+    sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
     allowed = [s for s in STARTS if s > 0.0 or any(u.low < 0.0 for u in members)]
-    return [np.where(sizes, s * size * x, x) for s in allowed]
+    switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
+    return [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
 
 
 def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evidence) -> list[Array]:

@@ -40,13 +40,16 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
 
 
-def free_run_score(trial: Trial, evidence: Evidence) -> float:
-    """Score a trial on the free run's continuation behind the part that the fit has seen."""
+def free_run_score(trial: Trial, evidence: Evidence, seen: float = SEEN) -> float:
+    """Score a trial on the free run's continuation behind the share that the fit has seen.
+
+    seen: 0 for trials that were all fitted to the whole.
+    """
     errors = free_run_errors(trial.machine, evidence)
-    unseen = np.concatenate([error[int(SEEN * len(error)) :] for error in errors])
+    unseen = np.concatenate([error[int(seen * len(error)) :] for error in errors])
     if not np.all(np.isfinite(unseen)):
         return float("inf")
-    return score(np.mean(unseen**2, axis=0), evidence.duration(1.0 - SEEN) / BLOCK, trial.x.size)
+    return score(np.mean(unseen**2, axis=0), evidence.duration(1.0 - seen) / BLOCK, trial.x.size)
 
 
 def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:

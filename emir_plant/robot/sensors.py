@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_plant.noise import generator
 from emir_plant.robot import linkage
 from emir_plant.robot.actuators import ACTUATORS
 from emir_plant.robot.plant import RobotPlant, RobotTruth
@@ -31,7 +32,7 @@ def measure(plant: RobotPlant, truth: RobotTruth, sample: int) -> RobotMeasureme
     The noise depends on the seed and the sample's number alone.
     """
     sensors, drives = plant.robot.main.sensors, plant.tables.drives
-    noise = np.random.default_rng((sensors.seed, sample)).standard_normal((2, ACTUATORS))
+    noise = generator(sensors.seed, sample).standard_normal((2, ACTUATORS))
     step = sensors.resolver_span / 2.0**sensors.resolver_bits
     angle = np.floor(truth.angle / step + 0.5) * step
     strokes = [

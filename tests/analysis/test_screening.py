@@ -92,6 +92,22 @@ def test_an_effect_that_shows_only_when_it_is_large_is_seen() -> None:
     assert first.machine.effects.supply_pressure_droop.resistance == pytest.approx(1.9e10, rel=0.1)
 
 
+def test_one_of_several_sizes_is_seen_where_another_hides_it() -> None:
+    """The logic block's pilot, begun beside its threshold, takes away what the threshold explains.
+
+    A threshold of 125 bar in place of 40, above which the lifting chamber's pressure has to be.
+    """
+    stated = joint1()
+    spring = {"effects.logic_block_fault.threshold": 85e5}
+    evidence = Evidence([recorded_run(with_values(stated, spring))], stated)
+    floor = evidence.floor(stated)
+    sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
+    plain = fit_balances(trial(sheet, ()), evidence, floor)
+    first = screen(plain, sheet, evidence, floor)[0].trial
+    assert first.name == "logic_block_fault"
+    assert first.machine.effects.logic_block_fault.threshold == pytest.approx(85e5, rel=0.05)
+
+
 def test_what_the_residuals_do_not_depend_on_stays_unknown() -> None:
     def model(points: Array) -> Array:
         return np.array([x[0] * TIME - 2.0 * TIME for x in points])

@@ -12,7 +12,8 @@ from emir_control.actuator import Actuator
 from emir_control.boom import Boom
 from emir_control.drive_plan import PARTS, Begin, Drive, HeldTask, gentlest, onward
 from emir_control.least_bending import NoMotionError, Task, limit
-from emir_control.motion_plan import Planner
+from emir_control.motion_plan import Planner, UnderWay, holding
+from emir_control.prefilter import joint_angle
 from emir_control.trajectory import Move
 from emir_plant.sheet import joint1
 
@@ -122,6 +123,18 @@ def test_a_plan_changes_its_velocity_when_commands_act(since: float) -> None:
         begin = plan.begins + k * 0.032
         whole = plan.velocity(begin, 0.032)
         assert plan.velocity(begin + 0.008, 0.016) == pytest.approx(whole, abs=4e-4)
+
+
+def test_a_swinging_boom_that_is_where_it_should_be_is_brought_to_rest_there() -> None:
+    drive, boom = Actuator(actuator(joint1())), _boom(300.0)
+    angle, stroke = joint_angle(0.4, drive.parameters.static), 0.4
+    shape = boom.clamped().rigid * angle + boom.sag() * math.cos(angle)
+    swinging = 1e-2 * boom.clamped().shapes[:, 0]
+    force = holding(boom, drive, angle)
+    now = UnderWay(1.0, angle, float(boom.joint @ swinging), shape, swinging, force, 0.0)
+    plan = Planner(drive, 0.032, 0.0405, ALLOWANCE).onward(boom, now, stroke, 2.0)
+    assert plan.at(math.inf).stroke == pytest.approx(stroke, abs=1e-4)
+    assert plan.bend(1.0 + 2.0) == pytest.approx(0.0, abs=0.1 * abs(plan.deflection).max())
 
 
 def test_a_plan_ends_where_the_move_does() -> None:

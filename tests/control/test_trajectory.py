@@ -5,7 +5,13 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from emir_common.quantity import ParameterError
-from emir_control.trajectory import TrajectoryInputs, TrajectoryParameters, Trapezoid, named
+from emir_control.trajectory import (
+    TrajectoryInputs,
+    TrajectoryParameters,
+    TrajectoryState,
+    Trapezoid,
+    named,
+)
 
 CASES = [Trapezoid(0.06375, 0.025, 0.75), Trapezoid(-0.2, 0.05, 0.4), Trapezoid(0.002, 0.025, 0.75)]
 
@@ -64,3 +70,13 @@ def test_what_is_seen_ahead_is_what_comes() -> None:
         came.append(reference.stroke)
     for k, strokes in enumerate(seen[:-20]):
         assert list(strokes) == came[k + 1 : k + 21]
+
+
+def test_what_is_seen_ahead_is_the_same_where_the_state_keeps_it() -> None:
+    trajectory = named("lift-lower", TrajectoryParameters(delay=0.5, pause=0.5))
+    inputs = TrajectoryInputs(0.3)
+    keeping = trajectory.initial(inputs)
+    for ticks in range(300):
+        ahead = trajectory.ahead(keeping, 20, 0.032)
+        assert ahead == trajectory.ahead(TrajectoryState(0.3, ticks), 20, 0.032)
+        keeping, _ = trajectory.step(keeping._replace(ahead=ahead), inputs, 0.032)

@@ -1,0 +1,78 @@
+"""Where a run starts, and that only effects stay in a model which its recordings need."""
+
+import numpy as np
+import pytest
+import recorded
+
+from emir_analysis.diagnosis.balances import sensed
+from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
+from emir_analysis.diagnosis.diagnose import Search
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.free_run import free_runs
+from emir_common.parameter_tree import with_values
+from emir_plant.parameters import Machine
+from emir_plant.sheet import Sheet, joint1
+
+TOLERANCES = {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}
+FRICTION = {"effects.viscous_friction.coefficient": 1e5}  # N s/m
+SHIFT = {"effects.valve_null_offset.offset": 0.03}
+
+
+def run(machine: Machine, duration: float = 16.0) -> Experiment:
+    """Return a run of a machine as its sensors show it."""
+    held = round(recorded.COMMAND_PERIOD / COMMAND_STEP)
+    commands = np.repeat(recorded.moves(duration, seed=5), held)
+    samples = commands.size // 10 + 1
+    empty = Experiment(
+        "run", 10 * COMMAND_STEP, commands, np.zeros(samples), np.zeros((samples, 4)), 20
+    )
+    return sensed(empty, machine, free_runs([machine], empty, [(0.8, 20e5)])[0])
+
+
+def search(missing: dict[str, float]) -> tuple[Search, Sheet, Evidence]:
+    """Return the search for what a data sheet lacks, before its first round."""
+    stated = joint1()
+    evidence = Evidence([run(with_values(stated, missing))], stated)
+    sheet = Sheet(stated, TOLERANCES, {}, ())
+    return Search(evidence, sheet, lambda _: None), sheet, evidence
+
+
+def fitted(begun: tuple[Search, Sheet, Evidence], *effects: str) -> Trial:
+    """Return a trial with the effects, fitted."""
+    searched, sheet, evidence = begun
+    start = fit_balances(trial(sheet, effects), evidence, searched.floor)
+    return searched.whole(fit_free_run(start, evidence))
+
+
+@pytest.mark.parametrize("samples", [2, 4, 10, 20])
+def test_the_pressure_at_the_start_is_known_while_oil_leaks(samples: int) -> None:
+    """A worn piston under 85 bar lets 0.08 l/s past, for which p_S rises by some 13 bar/s."""
+    noise = joint1().sensors.pressure_noise
+    time = np.arange(100) * 0.2 / samples
+    outputs = np.zeros((100, 4))
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        outputs[:, 2] = 25e5 + 13e5 * time + noise * random.standard_normal(100)
+        found = Experiment("leak", time[1], np.zeros(0), time, outputs, samples).start()[1]
+        assert abs(found - 25e5) < 4.5 * noise  # that seldom, of a line through two samples
+
+
+def test_an_effect_that_is_not_needed_is_dropped() -> None:
+    begun = search(FRICTION)
+    pair = fitted(begun, "viscous_friction", "valve_null_offset")
+    kept = begun[0].needed(pair)
+    assert kept.effects == ("viscous_friction",)
+    assert kept.machine.effects.viscous_friction.coefficient == pytest.approx(1e5, rel=0.02)
+    assert not any("valve_null_offset" in u.path for u in kept.unknowns.members)
+
+
+def test_what_is_needed_stays() -> None:
+    begun = search(FRICTION | SHIFT)
+    pair = fitted(begun, "viscous_friction", "valve_null_offset")
+    assert begun[0].needed(pair).effects == pair.effects
+
+
+def test_a_healthy_machine_keeps_no_effect() -> None:
+    begun = search({})
+    assert begun[0].needed(fitted(begun, "viscous_friction")).effects == ()

@@ -331,10 +331,11 @@ def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
     dx: rates without the dry friction, N.
     """
     last = p.mode_joint.size - 1
-    moved = p.mode_joint[last] * arm
+    moved: float = p.mode_joint[last] * arm
     rate = MODES + p.mode_joint.size + last
     acceleration = dx[rate] - moved * friction
-    return abs(moved) * math.sqrt(x[rate] ** 2 + acceleration**2 / p.mode_stiffness[last])
+    amplitude: float = math.sqrt(x[rate] ** 2 + acceleration**2 / p.mode_stiffness[last])
+    return abs(moved) * amplitude
 
 
 @compiled

@@ -86,7 +86,7 @@ def test_stick_and_slip_that_keeps_up_a_bending_mode_agrees_with_a_stiff_solver(
     assert turns > 2 * 60  # the mode swings on ...
     assert np.ptp(late) > 0.01  # ... and largely
     difference = ours[1500:, velocity] - late
-    assert np.sqrt(np.mean(difference**2)) < 0.05 * np.std(late)
+    assert np.sqrt(np.mean(difference**2)) < 0.1 * np.std(late)
 
 
 def test_a_step_is_short_only_where_friction_turns_round() -> None:

@@ -39,6 +39,9 @@ DELAY_LINE = 13  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
+FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging: the phase that
+# Runge-Kutta loses in it adds up over seconds and shifts the instants of sticking
+SWING = 2e-3  # m/s, amplitude of the piston in that mode from which on they are taken
 
 
 class Truth(NamedTuple):
@@ -236,26 +239,41 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
     x: Array, command: float, dt: float, step: float, parameters: NDArray[Any], work: Array
 ) -> None:
     """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
-    k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
     p = parameters[0]
     steps = max(1, math.ceil(dt / step - 1e-9))
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
-        dry = _write_first_rates(x, arriving, h, p, k1)
-        _write_sum(x, 0.5 * h, k1, p, between)
-        _write_rates(between, arriving, _motion(between, p), dry, p, k2)
-        _write_sum(x, 0.5 * h, k2, p, between)
-        _write_rates(between, arriving, _motion(between, p), dry, p, k3)
-        _write_sum(x, h, k3, p, between)
-        _write_rates(between, arriving, _motion(between, p), dry, p, k4)
-        for i in range(DELAY_LINE):
-            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-        for i in range(MODES, MODES + 2 * p.mode_joint.size):
-            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-        x[P_H] = max(x[P_H], 0.0)
-        x[P_S] = max(x[P_S], 0.0)
-        remember(x, p)
+        left = h
+        while left > 0.0:
+            left -= _step(x, arriving, left, h, p, work)
+
+
+@compiled
+def _step(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, left: float, usual: float, p: Any, work: Array
+) -> float:
+    """Advance x in place by one step of Runge-Kutta 4; return the step, s.
+
+    left: the most it may be, s. usual: step without dry friction, s.
+    """
+    k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
+    dry = _write_first_rates(x, command, left, usual, p, k1)
+    h = dry.step
+    _write_sum(x, 0.5 * h, k1, p, between)
+    _write_later_rates(between, command, dry, p, k2)
+    _write_sum(x, 0.5 * h, k2, p, between)
+    _write_later_rates(between, command, dry, p, k3)
+    _write_sum(x, h, k3, p, between)
+    _write_later_rates(between, command, dry, p, k4)
+    for i in range(DELAY_LINE):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    for i in range(MODES, MODES + 2 * p.mode_joint.size):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    x[P_H] = max(x[P_H], 0.0)
+    x[P_S] = max(x[P_S], 0.0)
+    remember(x, p)
+    return h
 
 
 @compiled
@@ -277,21 +295,59 @@ def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
 
 
 @compiled
-def _write_first_rates(x: Array, command: float, h: float, p: Any, dx: Array) -> float:
-    """Write dx/dt at the start of a step of h, s; return the dry friction over the step, N."""
+def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, left: float, usual: float, p: Any, dx: Array
+) -> dry_friction.Friction:
+    """Write dx/dt at the start of a step; return its dry friction. left, usual: as for `_step`."""
     n = p.mode_joint.size
     motion = _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
+    if not terms.has_dry_friction(p):
+        return dry_friction.Friction(left, 0.0, False)
     turning, admittance = 0.0, 0.0
     for i in range(n):
         turning += p.mode_joint[i] * dx[MODES + n + i]
         admittance += p.mode_joint[i] * p.mode_joint[i]
-    mobility = h * motion.arm * motion.arm * admittance
-    unhindered = motion.joint_velocity + h * (motion.arm * turning)
-    dry = dry_friction.over_step(unhindered, mobility, motion.force, p)
+    friction = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    fine = usual / FINER if usual <= STEP else usual
+    dry = dry_friction.over_step(
+        motion.joint_velocity,
+        motion.arm * turning,
+        motion.arm * motion.arm * admittance,
+        motion.force,
+        min(left, fine if _swing(x, dx, motion.arm, friction, p) > SWING else usual),
+        fine,
+        p,
+    )
     for i in range(n):
-        dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry
+        dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry.force
     return dry
+
+
+@compiled
+def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
+    """Return the piston's amplitude in the fastest mode, m/s.
+
+    dx: rates without the dry friction, N.
+    """
+    last = p.mode_joint.size - 1
+    moved: float = p.mode_joint[last] * arm
+    rate = MODES + p.mode_joint.size + last
+    acceleration = dx[rate] - moved * friction
+    amplitude: float = math.sqrt(x[rate] ** 2 + acceleration**2 / p.mode_stiffness[last])
+    return abs(moved) * amplitude
+
+
+@compiled
+def _write_later_rates(
+    x: Array, command: float, dry: dry_friction.Friction, p: Any, dx: Array
+) -> None:
+    """Write dx/dt at a later stage of a step under its dry friction."""
+    motion = _motion(x, p)
+    force = dry.force
+    if not dry.held:
+        force = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    _write_rates(x, command, motion, force, p, dx)
 
 
 @compiled

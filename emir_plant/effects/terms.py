@@ -34,6 +34,13 @@ def dry_friction(velocity: float, load: float, p: Any) -> float:
 
 
 @compiled
+def has_dry_friction(p: Any) -> bool:
+    """Tell whether the machine has any of it."""
+    force = p.coulomb_friction_force + p.stribeck_friction_force
+    return force + p.pressure_dependent_friction_coefficient > 0.0
+
+
+@compiled
 def leakage(pressure_lifting: float, pressure_lowering: float, p: Any) -> tuple[float, float]:
     """Return the flows that leave the lifting and the lowering chamber, m^3/s; pressures in Pa."""
     across = internal_leakage.flow(pressure_lifting, pressure_lowering, p)

@@ -27,7 +27,7 @@ def _with_friction(force: float, smoothing_speed: float) -> Plant:
 @pytest.mark.parametrize("unhindered", [1e-6, 1e-3, 0.05, -1e-6, -0.05])
 def test_friction_of_a_step_belongs_to_the_velocity_at_its_end(unhindered: float) -> None:
     p, mobility = _with_friction(2e4, 1e-4).record[0], 2e-7
-    friction = dry_friction.over_step(unhindered, mobility, 6e5, p)
+    friction = dry_friction.at_end(unhindered, mobility, 6e5, p)
     end = unhindered - mobility * friction
     assert friction == pytest.approx(2e4 * math.tanh(end / 1e-4), rel=1e-6)
     assert end * unhindered >= 0.0  # it stops a motion, it does not turn it round
@@ -62,6 +62,45 @@ def test_sticking_and_sliding_agree_with_a_stiff_solver(
         assert np.abs(ours[:, k] - exact[:, k]).max() < 2e-3 * np.ptp(exact[:, k]), name
 
 
+def test_stick_and_slip_that_keeps_up_a_bending_mode_agrees_with_a_stiff_solver(
+    stiff_solver: Callable[..., np.ndarray],
+) -> None:
+    """Slow lifting: the piston stops and breaks away with every swing of the 63 Hz mode.
+
+    An error in the instants of sticking adds up over all of them.
+    """
+    values = {
+        "effects.stribeck_friction.force": 2.5e4,
+        "effects.stribeck_friction.breakaway": 1.5,
+        "effects.stribeck_friction.stribeck_speed": 6e-3,
+        "effects.stribeck_friction.smoothing_speed": 2e-4,
+    }
+    plant, commands = Plant(with_values(joint1(), values)), np.zeros(2500)
+    commands[100:] = 0.35
+    start = plant.initial(FORTY_FIVE, 20e5)
+    ours = plant.simulate(start, commands, 1e-3)
+    exact = np.array([plant.outputs(x) for x in stiff_solver(plant, start, commands, "LSODA")])
+    velocity = Truth._fields.index("velocity")
+    late = exact[1500:, velocity]
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(late))))
+    assert turns > 2 * 60  # the mode swings on ...
+    assert np.ptp(late) > 0.01  # ... and largely
+    difference = ours[1500:, velocity] - late
+    assert np.sqrt(np.mean(difference**2)) < 0.1 * np.std(late)
+
+
+def test_a_step_is_short_only_where_friction_turns_round() -> None:
+    p, longest = _with_friction(2e4, 1e-4).record[0], 1e-3
+    weight = 1e-4  # 1/kg, of the piston
+    sliding = dry_friction.over_step(0.02, 1.0, weight, 6e5, longest, longest, p)
+    creeping = 1e-4 * math.atanh(0.5)
+    stuck = dry_friction.over_step(creeping, 1.0, weight, 6e5, longest, longest, p)
+    turning = dry_friction.over_step(-1e-4, 5.0, weight, 6e5, longest, longest, p)
+    assert sliding == (longest, pytest.approx(2e4), False)
+    assert stuck == (longest, pytest.approx(1.0 / weight, rel=1e-3), True)  # it holds the load
+    assert turning.step <= dry_friction.SHORTEST * longest
+
+
 def test_without_friction_nothing_changes() -> None:
     p = Plant(joint1()).record[0]
-    assert dry_friction.over_step(0.01, 2e-7, 6e5, p) == 0.0
+    assert dry_friction.over_step(0.01, 20.0, 1e-4, 6e5, 1e-3, 1e-3, p) == (1e-3, 0.0, False)

@@ -119,6 +119,18 @@ class ReliefValve(Effect):
 
 
 @dataclass(frozen=True)
+class LoadHoldingValve(Effect):
+    """A check valve on the cylinder that opens for lifting alone: shut, less oil is the spring."""
+
+    balance: ClassVar[Balance] = "chambers"
+    sizes: ClassVar[tuple[str, ...]] = ("line",)
+    source: ClassVar[str] = "cranes must hold their load when a hose breaks (EN 12999)"
+    trial: ClassVar[dict[str, float]] = {"line": 0.3}
+
+    line: float = quantity("1", 0.0, 0.9, "share of the oil beyond the valve", default=0.0)
+
+
+@dataclass(frozen=True)
 class InternalLeakage(Effect):
     """Oil leaks past the piston, in proportion to the pressure."""
 
@@ -181,15 +193,16 @@ class ExternalLoad(Effect):
 
 @dataclass(frozen=True)
 class ElasticBoom(Effect):
-    """The mass moves behind a spring, an elastic arm; beside it the piston has none."""
+    """The mass moves behind a spring, an elastic arm, and play; beside it the piston has none."""
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("compliance",)
-    source: ClassVar[str] = "first bending mode; slender arms are softer than the oil"
-    trial: ClassVar[dict[str, float]] = {"compliance": 1.0, "damping": 0.1}
+    source: ClassVar[str] = "first bending mode; slender arms are softer than the oil; worn pins"
+    trial: ClassVar[dict[str, float]] = {"compliance": 1.0, "damping": 0.1, "play": 0.1}
 
     compliance: float = quantity("1", 0.0, 20.0, "of the arm over that of the oil", default=0.0)
     damping: float = quantity("1", 0.02, 0.5, "of critical, of mass and arm", default=0.1)
+    play: float = quantity("pressure", 0.0, 5.0, "half, as the oil that fills it", default=0.0)
 
 
 @dataclass(frozen=True)
@@ -218,6 +231,7 @@ class Effects:
     flow_limit: FlowLimit = FlowLimit()
     supply_pressure_droop: SupplyPressureDroop = SupplyPressureDroop()
     relief_valve: ReliefValve = ReliefValve()
+    load_holding_valve: LoadHoldingValve = LoadHoldingValve()
     internal_leakage: InternalLeakage = InternalLeakage()
     line_resistance: LineResistance = LineResistance()
     coulomb_friction: CoulombFriction = CoulombFriction()

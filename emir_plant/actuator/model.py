@@ -2,14 +2,14 @@
 
     spool      T dy/dt = u - y
     flow       Q = gain o(y)
-    oil        dp/dt = Q - w - leakage
+    oil        dp/dt = (Q - w - leakage) / share; 1, or less behind a shut load-holding valve
     mass       dw/dt = omega^2 (p - friction(w) - load) - force of the swinging load
 
 p: pressure above that at rest, w: velocity as a flow, o: opening behind play, delay, offset and
 overlap. One unit of flow raises the pressure by one per unit of time. With an elastic arm the
 mass's velocity is another one, a, and the light piston's follows from p = friction(w) + load + f:
 
-    arm        f = s / compliance + d (w - a),   ds/dt = w - a
+    arm        f = (s beyond the play) / compliance + d (w - a),   ds/dt = w - a
     mass       da/dt = omega^2 f - force of the swinging load
 """
 
@@ -133,11 +133,27 @@ def _damper(p: Any) -> float:
 
 
 @compiled
+def _spring_force(way: float, p: Any) -> float:
+    """Return the arm's force at a way of the piston against the mass, as a pressure."""
+    play = p.effects_elastic_boom_play
+    return (way - min(max(way, -play), play)) / p.effects_elastic_boom_compliance
+
+
+@compiled
+def _share(flow: float, p: Any) -> float:
+    """Return the share of the oil that is compressed beside the piston."""
+    return 1.0 if flow > 0.0 else 1.0 - p.effects_load_holding_valve_line
+
+
+@compiled
 def _steps(p: Any, period: float) -> int:
-    """Return the steps between two samples that resolve a light piston on the oil."""
-    if p.effects_elastic_boom_compliance == 0.0:
-        return STEPS
-    fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    """Return the steps between two samples that resolve what is fastest on the oil."""
+    fastest = 0.0
+    if p.effects_elastic_boom_compliance > 0.0:
+        fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    if p.effects_relief_valve_high > 0.0 or p.effects_relief_valve_low > 0.0:
+        fastest += RELIEF
+    fastest /= 1.0 - p.effects_load_holding_valve_line
     return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
 
 
@@ -166,7 +182,7 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
     if p.effects_elastic_boom_compliance > 0.0:
         damper = _damper(p)
-        spring = x[ARM_WAY] / p.effects_elastic_boom_compliance
+        spring = _spring_force(x[ARM_WAY], p)
         velocity = _light_piston(pressure - load - spring + damper * x[ARM], damper, p)
         carrier = x[ARM]
         slope[VELOCITY] = 0.0
@@ -184,7 +200,7 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     moved = ARM if p.effects_elastic_boom_compliance > 0.0 else VELOCITY
     slope[moved] -= p.effects_swinging_load_mass_ratio * tug
     slope[SPOOL] = (command - x[SPOOL]) / p.valve_time_constant
-    slope[PRESSURE] = flow - velocity - leakage
+    slope[PRESSURE] = (flow - velocity - leakage) / _share(flow, p)
     slope[WAY] = velocity
     slope[SWING] = tug
     slope[SWING_WAY] = carrier - x[SWING]

@@ -2,20 +2,24 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import actuator_recorded as recorded
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
 
 from emir_analysis.cli import main
 from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
 from emir_analysis.diagnosis.actuator.fitting import fit
-from emir_analysis.diagnosis.actuator.record import open_record
+from emir_analysis.diagnosis.actuator.record import ActuatorRecord, open_record
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
+from emir_common.parameter_tree import with_values
 from emir_plant import actuator
-from emir_plant.actuator import is_actuator, load_actuator
+from emir_plant.actuator import ActuatorSheet, is_actuator, load_actuator
 
 Spoiler = Callable[[recorded.Array, recorded.Array], tuple[recorded.Array, recorded.Array]]
 
@@ -101,8 +105,54 @@ def test_a_parameter_stated_as_zero_is_fitted(folder: Path) -> None:
     bag, _ = recorded.record(folder, _proportional)
     sheet = load_actuator(folder / "sheet.yaml")
     record = open_record(bag, read_signal_map(folder / "signals.yaml"))
-    found = fit(sheet, (), record, sheet.machine).machine
+    found = fit(sheet, (), record).machine
     assert found.load.viscous_friction == pytest.approx(recorded.FRICTION, rel=0.05)
+
+
+def _one_unknown(folder: Path) -> tuple[ActuatorSheet, ActuatorRecord]:
+    """Return a sheet that leaves the gain open, alone, and a recording."""
+    bag, _ = recorded.record(folder, _proportional)
+    sheet = load_actuator(folder / "sheet.yaml")
+    gain = {"valve.gain": sheet.ranges["valve.gain"]}
+    return replace(sheet, ranges=gain), open_record(bag, read_signal_map(folder / "signals.yaml"))
+
+
+def test_the_evidence_is_the_integral_over_what_is_expected(folder: Path) -> None:
+    sheet, record = _one_unknown(folder)
+    found = fit(sheet, (), record)
+    expected, deviation = np.log(1.0), np.log(10.0 / 0.1) / 4.0  # range 0.1 ... 10 around 1
+    independent = 4.0 * record.pressure.size / (2.0 * np.pi / 0.25)
+
+    def density(x: float) -> float:
+        machine = with_values(sheet.machine, {"valve.gain": np.exp(x)})
+        error = actuator.simulate(machine, record.opening, 1.0) - record.pressure
+        likely = -0.5 * independent * np.mean(error**2) / found.rms**2
+        return float(np.exp(likely + 0.5 * independent) * norm.pdf(x, expected, deviation))
+
+    (at,) = found.x
+    integral, _ = quad(density, at - 1.0, at + 1.0, points=[at - 0.1, at, at + 0.1])
+    whole = np.log(integral) - 0.5 * independent - independent * np.log(found.rms)
+    assert found.evidence == pytest.approx(whole, abs=0.05)
+
+
+def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None:
+    sheet, record = _one_unknown(folder)
+    own = actuator.simulate(sheet.machine, record.opening, record.period)
+    found = fit(sheet, (), replace(record, pressure=own))
+    assert found.rms == 0.0
+    assert found.machine == sheet.machine
+    assert np.isfinite(found.evidence)
+
+
+def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -> None:
+    sheet, record = _one_unknown(folder)
+    record = replace(record, opening=0.2 * record.opening, pressure=0.2 * record.pressure)
+    without = fit(sheet, (), record)
+    found = fit(sheet, ("relief_valve",), record)  # opens at a pressure that is never reached
+    valve = found.machine.effects.relief_valve
+    assert (valve.high, valve.low) == pytest.approx((3.0, 3.0))
+    assert np.diag(found.covariance)[1:] == pytest.approx(4.0)
+    assert found.evidence == pytest.approx(without.evidence, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -137,9 +187,10 @@ def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> No
     own = Path(actuator.__file__).parent / "data" / "crane_actuator.yaml"
     assert is_actuator(own)
     sheet = load_actuator(own)
-    plain = fit(sheet, (), record, sheet.machine, restarts=8)
-    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, plain.machine, restarts=8)
+    plain = fit(sheet, (), record, drawn=8)
+    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, drawn=8)
     assert limited.rms < 0.7 * plain.rms < 0.7 * np.std(record.pressure)
     both = ("flow_limit", "turbulent_resistance", "elastic_boom", "swinging_load")
-    behind = fit(sheet, both, record, limited.machine, restarts=3)
+    behind = fit(sheet, both, record, [limited.machine], drawn=3)
     assert behind.rms < 0.9 * limited.rms
+    assert behind.evidence > limited.evidence > plain.evidence

@@ -33,7 +33,8 @@ def _with(effect: str, **values: float) -> Actuator:
 def test_free_run_agrees_with_an_independent_solver() -> None:
     machine = with_values(PLAIN, {
         "effects.elastic_boom.compliance": 1.5,
-        "effects.elastic_boom.damping": 0.1, "effects.swinging_load.mass_ratio": 0.1,
+        "effects.elastic_boom.damping": 0.1, "effects.elastic_boom.play": 0.1,
+        "effects.load_holding_valve.line": 0.4, "effects.swinging_load.mass_ratio": 0.1,
         "effects.swinging_load.frequency": 0.2, "effects.swinging_load.damping": 0.01,
         "effects.turbulent_resistance.coefficient": 0.3, "effects.valve_null_offset.offset": 0.05,
         "effects.internal_leakage.conductance": 0.02, "effects.external_load.force": 0.1,
@@ -45,17 +46,19 @@ def test_free_run_agrees_with_an_independent_solver() -> None:
     def slope(t: float, x: np.ndarray) -> list[float]:
         spool, oil, arm, spring, swing, swing_way = x
         flow = 1.5 * (spool + 0.05)
+        bent = np.sign(spring) * max(abs(spring) - 0.1, 0.0)
+        filled = 1.0 if flow > 0.0 else 0.6
 
         def surplus(piston: float) -> float:  # of the pressure, beside a piston without mass
             friction = 0.4 * piston + 0.3 * piston * abs(piston)
-            return oil - 0.1 - friction - spring / 1.5 - damper * (piston - arm)
+            return oil - 0.1 - friction - bent / 1.5 - damper * (piston - arm)
 
         piston = brentq(surplus, -50.0, 50.0, xtol=1e-12)
         tug = 0.2**2 * swing_way + 2 * 0.01 * 0.2 * (arm - swing)
         return [
             (np.interp(t - 2.5, TIME, OPENING) - spool) / 2.0,
-            flow - piston - 0.02 * oil,
-            0.3**2 * (spring / 1.5 + damper * (piston - arm)) - 0.1 * tug,
+            (flow - piston - 0.02 * oil) / filled,
+            0.3**2 * (bent / 1.5 + damper * (piston - arm)) - 0.1 * tug,
             piston - arm,
             tug,
             arm - swing,
@@ -95,16 +98,35 @@ def test_a_flow_limit_limits_the_steady_velocity_and_so_the_pressure() -> None:
     assert settled == pytest.approx(0.4 * 0.6, rel=0.05)  # pressure = friction * flow
 
 
-def test_an_arm_softer_than_the_oil_swings_as_slowly_as_both_springs_in_series() -> None:
-    machine = with_values(PLAIN, {
-        "load.viscous_friction": 0.0, "effects.elastic_boom.compliance": 3.0,
-        "effects.elastic_boom.damping": 0.02,
-    })  # fmt: skip
-    opening = np.interp(TIME, [0, 1, 2], [1.0, 1.0, 0.0])  # a jolt, then shut
+def _frequency_after_a_jolt(size: float, **effects: float) -> float:
+    """Return that of the pressure, valve shut, in rad per time."""
+    values = {name.replace("__", "."): value for name, value in effects.items()}
+    machine = with_values(PLAIN, {"load.viscous_friction": 0.0} | values)
+    opening = size * np.interp(TIME, [0, 1, 2], [1.0, 1.0, 0.0])
     free = simulate(machine, opening, 1.0)[60:]
-    crossings = np.flatnonzero((free[:-1] < free.mean()) & (free[1:] >= free.mean()))
-    period = float(np.mean(np.diff(crossings)))
-    assert 2.0 * np.pi / period == pytest.approx(0.3 / np.sqrt(1.0 + 3.0), rel=0.05)
+    above = free - free.mean()
+    after = np.flatnonzero((above[:-1] < 0.0) & (above[1:] >= 0.0))
+    crossings = after - above[after] / (above[after + 1] - above[after])
+    return float(2.0 * np.pi / np.mean(np.diff(crossings)))
+
+
+ARM = {"effects__elastic_boom__compliance": 3.0, "effects__elastic_boom__damping": 0.02}
+
+
+def test_an_arm_softer_than_the_oil_swings_as_slowly_as_both_springs_in_series() -> None:
+    assert _frequency_after_a_jolt(1.0, **ARM) == pytest.approx(0.3 / np.sqrt(1.0 + 3.0), rel=0.03)
+
+
+def test_play_in_the_arm_makes_small_motions_slower_and_leaves_large_ones() -> None:
+    with_play = ARM | {"effects__elastic_boom__play": 0.2}
+    without = _frequency_after_a_jolt(1.0, **ARM)
+    assert _frequency_after_a_jolt(100.0, **with_play) == pytest.approx(without, rel=0.01)
+    assert _frequency_after_a_jolt(0.3, **with_play) < 0.95 * without
+
+
+def test_oil_beyond_a_shut_load_holding_valve_is_no_spring() -> None:
+    shut = _frequency_after_a_jolt(-1.0, effects__load_holding_valve__line=0.5)
+    assert shut == pytest.approx(0.3 / np.sqrt(0.5), rel=0.01)
 
 
 def test_dry_friction_holds_a_light_piston_until_the_pressure_exceeds_it() -> None:

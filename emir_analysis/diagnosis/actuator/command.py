@@ -51,7 +51,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     found = search(sheet, record, noise_floor(sheet, record), progress)
     machines = stages(sheet, found)
     if model_out is not None:  # frozen before the judge is opened
-        write_actuator(model_out, replace(sheet, machine=found.chosen.fitted.machine))
+        write_actuator(model_out, replace(sheet, machine=found.chosen.machine))
     judged = None
     if judge is not None:
         progress(f"judging on {judge}")

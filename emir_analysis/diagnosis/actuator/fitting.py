@@ -1,12 +1,19 @@
-"""Fitting an actuator's parameters and those of effects to the free run of its pressure."""
+"""Fitting an actuator's parameters and those of effects to the free run of its pressure.
+
+What is known beforehand counts, too: a fit is the most probable one (maximum a posteriori) with
+normally distributed parameters, around the data sheet's values, a quarter of the range wide, and
+around the trial values of effects. A short recording leaves some of many parameters nearly open;
+this keeps them where machines have them, and makes a set's evidence a number: how probable the
+recording is under it (MacKay 1992, Neural Computation 4, 415).
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.signals import Array
@@ -20,15 +27,24 @@ STEP = 1e-3  # of the finite differences, in units of the trial value or the log
 EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
 ACCURACY = 1e-5  # relative, of cost and vector
 WIDE = 20.0  # a parameter whose range spans more than this factor is fitted as its logarithm
-SPREAD = math.log(4.0)  # of further starts: up to this factor from a known or a trial value
-DRAWN = 60  # places that are looked at for each further start; the best one is taken
+WIDTH = 4.0  # standard deviations in the range of a data sheet's entry
+TYPICAL = 2.0  # deviation of an effect's parameter from its trial value, in trial values
+TYPICAL_FACTOR = 4.0  # the same where it is fitted as its logarithm
+INDEPENDENT = 4.0  # errors in a slow period that count as independent
+GUESSED = 0.1  # rms error before the first fit, in spreads of the pressure
+EXACT = 1e-6  # of the spread: an rms error below is none
+ROUNDS = 2  # of fits with the rms error that the one before has left
+PLACES = 60  # drawn at random; the best of them are further starts
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """One parameter: value = scale x, or scale exp(x) when logarithmic; low, high: bounds of x."""
+    """One parameter: value = scale x, or scale exp(x) when logarithmic; low, high: bounds of x.
+
+    expected, deviation: of x, before anything is measured.
+    """
 
     path: str
     unit: str
@@ -36,6 +52,8 @@ class Unknown:
     low: float
     high: float
     logarithmic: bool
+    expected: float
+    deviation: float
 
     def value(self, x: float) -> float:
         """Return the parameter's value."""
@@ -46,15 +64,14 @@ class Unknown:
         x = math.log(value / self.scale) if self.logarithmic else value / self.scale
         return min(max(x, self.low), self.high)
 
-    def near(self, x: float, random: float) -> float:
-        """Return a place up to a factor away; random: -1 ... 1."""
-        moved = x + SPREAD * random if self.logarithmic else x * math.exp(SPREAD * random)
-        return min(max(moved, self.low), self.high)
-
 
 @dataclass(frozen=True)
 class Fitted:
-    """A machine fitted with effects: x (k,) at the optimum, its covariance (k, k), rms error."""
+    """A machine fitted with effects: x (k,) at the optimum, its covariance (k, k), rms error.
+
+    evidence: logarithm of the recording's probability under these effects, whatever their sizes
+    (Laplace's approximation), up to a constant of the recording.
+    """
 
     effects: tuple[str, ...]
     unknowns: tuple[Unknown, ...]
@@ -62,6 +79,7 @@ class Fitted:
     x: Array
     covariance: Array
     rms: float
+    evidence: float
 
     @property
     def name(self) -> str:
@@ -73,7 +91,7 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
     """Return what a data sheet leaves open and all parameters of the named effects."""
     stated = declared(sheet.machine)
     found = [
-        _unknown(path, stated[path][0].unit, float(stated[path][1]), low, high)
+        _stated(path, stated[path][0].unit, float(stated[path][1]), low, high)
         for path, (low, high) in sheet.ranges.items()
     ]
     for effect in effects:
@@ -84,80 +102,109 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
     return tuple(found)
 
 
+class _Surplus:
+    """Errors, and what the parameters deviate from what is expected, in units of both.
+
+    Half the square of it all is minus the logarithm of the machine's probability.
+    """
+
+    def __init__(
+        self,
+        sheet: ActuatorSheet,
+        members: tuple[Unknown, ...],
+        record: ActuatorRecord,
+        seen: Mask | None,
+    ) -> None:
+        self.members = members
+        self.low, self.high, self.expected, self.deviation = (
+            np.array([getattr(member, name) for member in members])
+            for name in ("low", "high", "expected", "deviation")
+        )
+        self._record = record
+        self._part = slice(None) if seen is None else seen
+        self._measured = record.pressure[self._part]
+        slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
+        self.independent = INDEPENDENT * self._measured.size / slow
+        self._parameters = flat_record(sheet.machine)
+        self._places = [field(member.path) for member in members]
+
+    def _error(self, x: Array) -> Array:
+        for place, member, v in zip(self._places, self.members, x, strict=True):
+            self._parameters[place] = member.value(float(v))
+        r = self._record
+        simulated = run(self._parameters, r.opening, r.period, float(r.pressure[0]))
+        return np.asarray(simulated[self._part] - self._measured)
+
+    def rms(self, x: Array) -> float:
+        """Return the rms error."""
+        return math.sqrt(float(np.mean(self._error(x) ** 2)))
+
+    def at(self, x: Array, rms: float) -> Array:
+        """Return deviations and errors; rms: the error that is expected."""
+        weight = math.sqrt(self.independent / self._measured.size) / rms
+        return np.concatenate([(x - self.expected) / self.deviation, weight * self._error(x)])
+
+    def _jacobian(self, x: Array, rms: float) -> Array:
+        here = self.at(x, rms)
+        steps = np.where(x + STEP > self.high, -STEP, STEP)
+        moved = x + np.diag(steps)
+        columns = [(self.at(row, rms) - here) / s for row, s in zip(moved, steps, strict=True)]
+        return np.stack(columns, 1)
+
+    def _inside(self, x: Array) -> Array:
+        margin = 1e-6 * (self.high - self.low)
+        return np.clip(x, self.low + margin, self.high - margin)
+
+    def drawn(self, rms: float) -> list[Array]:
+        """Return places drawn from what is expected, the same every time, the best first."""
+        random = np.random.default_rng(0).standard_normal((PLACES, self.expected.size))
+        places = self._inside(self.expected + self.deviation * random)
+        return sorted(places, key=lambda x: float(np.sum(self.at(x, rms) ** 2)))
+
+    def least(self, start: Array, rms: float) -> OptimizeResult:
+        """Return the minimum that is reached from a place."""
+        return least_squares(
+            self.at, self._inside(start), jac=self._jacobian, args=(rms,),
+            bounds=(self.low, self.high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
+        )  # fmt: skip
+
+
 def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     sheet: ActuatorSheet,
     effects: tuple[str, ...],
     record: ActuatorRecord,
-    known: Actuator,
+    known: Sequence[Actuator] = (),
     *,
     seen: Mask | None = None,
-    restarts: int = 0,
+    drawn: int = 0,
 ) -> Fitted:
-    """Minimise the free-run error of the pressure, or of the part `seen` (n,) of it.
+    """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
 
-    known: machine at which the search starts; effects that it lacks start at their trial values.
-    restarts: further starts, each the best of some places anywhere in the data sheet's ranges or
-    around that machine in turn, the same every time.
+    Starts are what is expected, each known machine (effects that it lacks at their trial values),
+    and the best `drawn` of places drawn from what is expected.
     """
     members = unknowns(sheet, effects)
-    low = np.array([member.low for member in members])
-    high = np.array([member.high for member in members])
-    part = slice(None) if seen is None else seen
-
-    def machine(x: Array) -> Actuator:
-        values = {m.path: m.value(float(v)) for m, v in zip(members, x, strict=True)}
-        return with_values(sheet.machine, values)
-
-    parameters = flat_record(sheet.machine)
-    places = [field(member.path) for member in members]
-
-    def error(x: Array) -> Array:
-        for place, member, v in zip(places, members, x, strict=True):
-            parameters[place] = member.value(float(v))
-        simulated = run(parameters, record.opening, record.period, float(record.pressure[0]))
-        return np.asarray((simulated - record.pressure)[part])
-
-    def jacobian(x: Array) -> Array:
-        here = error(x)
-        steps = np.where(x + STEP > high, -STEP, STEP)
-        moved = x + np.diag(steps)
-        return np.stack([(error(row) - here) / s for row, s in zip(moved, steps, strict=True)], 1)
-
-    first = _start(members, effects, known)
-    random = np.random.default_rng(0)
-
-    def near() -> Array:
-        signs = random.uniform(-1.0, 1.0, first.size)
-        return np.array([m.near(x, r) for m, x, r in zip(members, first, signs, strict=True)])
-
-    def anywhere() -> Array:
-        stated = len(sheet.ranges)
-        return np.append(random.uniform(low, high)[:stated], near()[stated:])
-
-    def size(x: Array) -> float:
-        return float(np.mean(error(x) ** 2))
-
-    starts = [first]
-    for k in range(restarts):
-        draw = near if k % 2 else anywhere
-        starts.append(min((draw() for _ in range(DRAWN)), key=size))
-    margin = 1e-6 * (high - low)
-    found = [
-        least_squares(
-            error, np.clip(start, low + margin, high - margin), jac=jacobian, bounds=(low, high),
-            xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
-        )
-        for start in starts
-    ]  # fmt: skip
-    best = min(found, key=lambda result: float(result.cost))
-    x = np.asarray(best.x)
+    surplus = _Surplus(sheet, members, record, seen)
+    spread = float(np.std(record.pressure))
+    rms = GUESSED * spread
+    starts = [surplus.expected, *(_start(members, effects, machine) for machine in known)]
+    if drawn:
+        starts += surplus.drawn(rms)[:drawn]
+    best = min((surplus.least(x, rms) for x in starts), key=lambda found: float(found.cost))
+    for _ in range(ROUNDS):
+        rms = max(surplus.rms(best.x), EXACT * spread)
+        best = surplus.least(best.x, rms)
+    curvature = best.jac.T @ best.jac  # of the logarithm of the probability
+    narrower = np.linalg.slogdet(surplus.deviation[:, None] * curvature * surplus.deviation)[1]
+    values = {m.path: m.value(float(v)) for m, v in zip(members, best.x, strict=True)}
     return Fitted(
         effects,
         members,
-        machine(x),
-        x,
-        _covariance(np.asarray(best.jac), np.asarray(best.fun)),
-        math.sqrt(2.0 * float(best.cost) / best.fun.size),
+        with_values(sheet.machine, values),
+        np.asarray(best.x),
+        np.linalg.inv(curvature),
+        surplus.rms(best.x),
+        -float(best.cost) - surplus.independent * math.log(rms) - 0.5 * float(narrower),
     )
 
 
@@ -171,12 +218,22 @@ def free_run_error(machine: Actuator, record: ActuatorRecord) -> Array:
     return free_run(machine, record) - record.pressure
 
 
+def _stated(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
+    """Return an entry of the data sheet with its range."""
+    found = _unknown(path, unit, value, low, high)
+    at = found.position(value)
+    return replace(found, expected=at, deviation=(found.high - found.low) / WIDTH)
+
+
 def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
+    """Return a parameter near a trial value; one of either sign is expected to be zero."""
     if low * high > 0.0 and max(high / low, low / high) > WIDE:
-        ends = sorted((math.log(low / value), math.log(high / value)))
-        return Unknown(path, unit, value, ends[0], ends[1], logarithmic=True)
+        least, most = sorted((math.log(low / value), math.log(high / value)))
+        width = math.log(TYPICAL_FACTOR)
+        return Unknown(path, unit, value, least, most, True, 0.0, width)
     scale = abs(value) or max(abs(low), abs(high))
-    return Unknown(path, unit, scale, low / scale, high / scale, logarithmic=False)
+    expected = 0.0 if low < 0.0 < high else value / scale
+    return Unknown(path, unit, scale, low / scale, high / scale, False, expected, TYPICAL)
 
 
 def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) -> Array:
@@ -199,18 +256,3 @@ def _trial(path: str) -> float:
 def _is_on(machine: Actuator, effect: str) -> bool:
     members = getattr(machine.effects, effect)
     return any(getattr(members, size) != 0.0 for size in members.sizes)
-
-
-def _covariance(jacobian: Array, error: Array) -> Array:
-    """Return the covariance (k, k) from the curvature; errors in a row count as one.
-
-    The number of independent errors follows from their correlation (Bartlett 1946).
-    """
-    centred = error - error.mean()
-    size = error.size
-    if not np.any(centred):
-        return np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    correlation = np.correlate(centred, centred, "full")[size - 1 :] / (centred @ centred)
-    repeated = float(1.0 + 2.0 * np.sum(correlation[1 : size // 4] ** 2))
-    inverse = np.linalg.pinv(jacobian.T @ jacobian)
-    return np.asarray(inverse * np.mean(error**2) * repeated)

@@ -1,6 +1,5 @@
 """The report of an actuator's diagnosis as a page, and its pictures."""
 
-import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -31,8 +30,7 @@ def write_page(
         for e in result.effects
         for name, p in e.parameters.items()
     ]
-    closest = sorted(result.candidates, key=lambda c: math.inf if c.unseen is None else c.unseen)
-    closest = closest[:SHOWN]
+    closest = result.candidates[:SHOWN]
     blocks: list[Block] = [
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
@@ -62,7 +60,8 @@ def write_page(
         Table(
             ("effects", "better by", "error on parts left out"),
             [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in closest],
-            "better by: Bayesian information criterion, over parameters only; 6 are strong. The"
+            "better by: twice the logarithm of how much more probable the recording is than under"
+            " parameters only; 6 are strong. The"
             f" {len(closest)} closest of {len(result.candidates)} that were tried.",
         ),
         Heading("Parameters"),

@@ -40,7 +40,11 @@ NOT_TOLD = (
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """What was tried. score: how much better (BIC) than parameters only; unseen: see `Tried`."""
+    """What was tried.
+
+    score: twice the logarithm of how much more probable than parameters only it makes the
+    recording; unseen: see `Search`, None where it was not looked at.
+    """
 
     name: str
     score: float
@@ -81,8 +85,8 @@ def stages(sheet: ActuatorSheet, found: Search) -> dict[str, Actuator]:
     """Return the machine as stated, re-fitted, and with the effects that were chosen."""
     return {
         "nominal": sheet.machine,
-        "refitted": found.plain.fitted.machine,
-        "with_effect": found.chosen.fitted.machine,
+        "refitted": found.plain.machine,
+        "with_effect": found.chosen.machine,
     }
 
 
@@ -138,7 +142,7 @@ def diagnosis(
     errors = {name: run - judged.pressure for name, run in runs.items()}
     ahead = one_step_errors(stages(sheet, found), record, judge)
     slow = _slow_period(found)
-    chosen = found.chosen.fitted
+    chosen = found.chosen
     fitted = _parameters(chosen)
     verdict = _verdict(found, noise)
     return ActuatorDiagnosis(
@@ -149,11 +153,10 @@ def diagnosis(
         else (),
         candidates=tuple(
             CandidateResult(
-                t.fitted.name,
-                found.plain.score - t.score,
-                t.unseen if math.isfinite(t.unseen) else None,
+                f.name, 2.0 * (f.evidence - found.plain.evidence), found.unseen.get(f.name)
             )
-            for t in found.tried[1:]
+            for f in found.tried
+            if f.effects
         ),
         balances={BALANCE: _balance(sheet, found, record, noise)},
         signals={PRESSURE: _signal(record.unit, noise, errors)},
@@ -199,28 +202,28 @@ def _unit(unit: str, result: ActuatorDiagnosis) -> str:
 
 
 def _verdict(found: Search, noise: float) -> str:
-    plain, chosen = found.plain, found.chosen
-    if plain.unseen <= AT_NOISE * noise:
+    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
+    if plain <= AT_NOISE * noise:
         return "nothing_missing"
-    if not chosen.fitted.effects or chosen.unseen > EXPLAINED * plain.unseen:
+    if not found.chosen.effects or chosen > EXPLAINED * plain:
         return "unexplained"
     return "ambiguous" if found.rivals else "found"
 
 
 def _statement(verdict: str, found: Search, noise: float) -> str:
-    chosen, plain = found.chosen, found.plain
+    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
     if verdict == "nothing_missing":
         return "parameters inside their ranges bring the free run to the noise"
     left = (
-        f"{chosen.unseen:.3g} is left of {plain.unseen:.3g} on parts left out of the fit,"
-        f" {chosen.unseen / noise:.0f} times the noise"
+        f"{chosen:.3g} is left of {plain:.3g} on parts left out of the fit,"
+        f" {chosen / noise:.0f} times the noise"
     )
     if verdict == "unexplained":
-        closest = f"{chosen.fitted.name} comes closest; " if chosen.fitted.effects else ""
+        closest = f"{found.chosen.name} comes closest; " if found.chosen.effects else ""
         return f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says why"
-    names = chosen.fitted.name
+    names = found.chosen.name
     if verdict == "ambiguous":
-        rivals = " or ".join(_instead(rival.fitted, chosen.fitted) for rival in found.rivals)
+        rivals = " or ".join(_instead(rival, found.chosen) for rival in found.rivals)
         names += f" ({rivals} would do as well: this recording cannot tell)"
     return f"{names}; {left}"
 
@@ -247,7 +250,7 @@ def _tests(
 
 
 def _slow_period(found: Search) -> float:
-    return 2.0 * math.pi / found.plain.fitted.machine.load.frequency
+    return 2.0 * math.pi / found.plain.machine.load.frequency
 
 
 def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:

@@ -31,6 +31,7 @@ from emir_analysis.diagnosis.select import (
     rivals,
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
+from emir_analysis.diagnosis.stick_slip import fullest, further, grown, simpler, sticks
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
@@ -162,6 +163,10 @@ class Search:
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
             before[equal[0].effects] = equal
             best = self._known_whole(min(better, key=_free))
+            if sticks(best.trial) and self._excess(best.trial) > LEFT**2 - 1.0:
+                told = self._by_beginning(best)
+                equal = equal if told is best else [told.trial]
+                best = told
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
@@ -225,6 +230,28 @@ class Search:
         """
         near = self._excess(best.trial) < HOPELESS**2
         return replace(best, trial=self.whole(best.trial)) if near else best
+
+    def _by_beginning(self, best: Tried) -> Tried:
+        """Return a trial that sticks with the friction that a growing beginning tells.
+
+        The trial itself where that is no better on the whole.
+        """
+        self._progress(f"friction by a growing beginning: {best.trial.name}")
+        start = fit_balances(fullest(best.trial, self._sheet), self._evidence, self.floor)
+        found = self._with_less_friction(grown(start, self._evidence))
+        if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
+            return best
+        self._whole[found.effects] = found
+        told = self._scored(found, free_run_score(found, self._evidence))
+        self.tried.append(told)
+        return told
+
+    def _with_less_friction(self, found: Trial) -> Trial:
+        for less in simpler(found, self._sheet):
+            fitted = further(less, self._evidence)
+            if self._on_whole(fitted) < self._on_whole(found) + STRONG:
+                return self._with_less_friction(fitted)
+        return found
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.

@@ -33,6 +33,7 @@ GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted 
 SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
+BEYOND_DOUBT = 6.0  # standard deviations
 SETTLING = 5.0  # s from the start in which the state at rest is found
 
 
@@ -62,6 +63,13 @@ class Trial:
     def spread(self) -> Array:
         """Standard deviations of x, (k,)."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def told(self, effect: str, field: str, none: float = 0.0) -> bool:
+        """Tell whether a field of an effect is beyond doubt not the value that stands for none."""
+        for unknown, x, spread in zip(self.unknowns.members, self.x, self.spread, strict=True):
+            if unknown.path == f"effects.{effect}.{field}":
+                return bool(abs(x - unknown.at(none)) > BEYOND_DOUBT * spread)
+        return False
 
     def at(self, x: Array) -> "Trial":
         """Return the trial with other parameters, (k,)."""

@@ -207,6 +207,8 @@ class Search:
             return chosen
         least = self._on_whole(self.whole(chosen)) + STRONG
         for effect in chosen.effects:
+            if any(self.whole(chosen).told(effect, size) for size in REGISTRY[effect].sizes):
+                continue
             fewer = self.whole(chosen).without(effect)
             if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
                 continue

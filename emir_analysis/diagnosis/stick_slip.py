@@ -20,7 +20,6 @@ FIRST = 3.0  # s, of the first beginning
 GROWTH = 1.5  # of a beginning from one to the next
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
-BEYOND_DOUBT = 6.0  # standard deviations
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
@@ -32,19 +31,23 @@ def sticks(known: Trial) -> bool:
 
 
 def fullest(known: Trial, sheet: Sheet) -> Trial:
-    """Return a trial with the friction that has all others in it but the load's."""
+    """Return a trial with the friction that has all others in it but the load's.
+
+    The maker's parameters are as stated again: instants of sticking have led them astray.
+    """
     for name in known.effects:
         if name in {*DRY, VISCOUS}:
             known = known.without(name)
+    known = known.at(np.where(known.unknowns.toleranced, 0.0, known.x))
     return trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     """Return trials with less friction, where it is not beyond doubt: not viscous, or Coulomb's."""
     found = []
-    if VISCOUS in full.effects and not _told(full, f"effects.{VISCOUS}.coefficient", 0.0):
+    if VISCOUS in full.effects and not full.told(VISCOUS, "coefficient"):
         found.append(full.without(VISCOUS))
-    if STRIBECK in full.effects and not _told(full, f"effects.{STRIBECK}.breakaway", 1.0):
+    if STRIBECK in full.effects and not full.told(STRIBECK, "breakaway", 1.0):
         found.append(_without_breakaway(full, sheet))
     return found
 
@@ -68,13 +71,6 @@ def further(known: Trial, evidence: Evidence) -> Trial:
 def _fitted(known: Trial, evidence: Evidence, x: Array) -> Solution:
     problem = free_run_problem(known, evidence, x)
     return fit(replace(problem, coarse=None, step=SLOPE_STEP), ACCURACY)
-
-
-def _told(known: Trial, path: str, none: float) -> bool:
-    """Tell whether a parameter is beyond doubt not the value that stands for none."""
-    k = [u.path for u in known.unknowns.members].index(path)
-    away = abs(known.x[k] - known.unknowns.members[k].at(none))
-    return bool(away > BEYOND_DOUBT * known.spread[k])
 
 
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:

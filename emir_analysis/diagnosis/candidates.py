@@ -33,7 +33,6 @@ GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted 
 SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
-BEYOND_DOUBT = 6.0  # standard deviations
 SETTLING = 5.0  # s from the start in which the state at rest is found
 
 
@@ -63,13 +62,6 @@ class Trial:
     def spread(self) -> Array:
         """Standard deviations of x, (k,)."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
-
-    def told(self, effect: str, field: str, none: float = 0.0) -> bool:
-        """Tell whether a field of an effect is beyond doubt not the value that stands for none."""
-        for unknown, x, spread in zip(self.unknowns.members, self.x, self.spread, strict=True):
-            if unknown.path == f"effects.{effect}.{field}":
-                return bool(abs(x - unknown.at(none)) > BEYOND_DOUBT * spread)
-        return False
 
     def at(self, x: Array) -> "Trial":
         """Return the trial with other parameters, (k,)."""
@@ -136,7 +128,7 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     polished. The state at rest at each recording's start (see `Starts`) is fitted along and then
     forgotten: it belongs to the recording, not to the machine.
     """
-    x = np.append(_shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
+    x = np.append(shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
     begins = [x]
     for share in GROWING:
         begun = fit(free_run_problem(start, evidence, begins[-1], share), ROUGH)
@@ -149,7 +141,7 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     return start.continued(fit(replace(whole, start=best), accuracy))
 
 
-def _shaped(start: Trial, evidence: Evidence) -> Trial:
+def shaped(start: Trial, evidence: Evidence) -> Trial:
     """Return the trial with those shapes of its effects whose free run is best."""
     for effect in start.effects:
         points = _shapes(start, effect)

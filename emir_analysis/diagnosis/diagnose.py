@@ -140,6 +140,7 @@ class Search:
         self.refitted = fit_free_run(self.balanced, evidence)
         self.tried: list[Tried] = []
         self._whole: dict[tuple[str, ...], Trial] = {}
+        self._settled: tuple[str, ...] = ()  # effects that are known to be needed
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
@@ -207,7 +208,7 @@ class Search:
             return chosen
         least = self._on_whole(self.whole(chosen)) + STRONG
         for effect in chosen.effects:
-            if any(self.whole(chosen).told(effect, size) for size in REGISTRY[effect].sizes):
+            if effect in self._settled:
                 continue
             fewer = self.whole(chosen).without(effect)
             if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
@@ -240,19 +241,25 @@ class Search:
         """
         self._progress(f"friction by a growing beginning: {best.trial.name}")
         start = fit_balances(fullest(best.trial, self._sheet), self._evidence, self.floor)
-        found = self._with_less_friction(grown(start, self._evidence))
+        found = self.with_less_friction(grown(start, self._evidence))
         if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
             return best
         self._whole[found.effects] = found
+        self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
         told = self._scored(found, free_run_score(found, self._evidence))
         self.tried.append(told)
         return told
 
-    def _with_less_friction(self, found: Trial) -> Trial:
+    def with_less_friction(self, found: Trial) -> Trial:
+        """Return a trial with as little friction as will do.
+
+        More has to take half of the rest away: a law that is a little off is mimicked by another.
+        """
         for less in simpler(found, self._sheet):
             fitted = further(less, self._evidence)
-            if self._on_whole(fitted) < self._on_whole(found) + STRONG:
-                return self._with_less_friction(fitted)
+            no_worse = self._on_whole(fitted) < self._on_whole(found) + STRONG
+            if no_worse or 0.5 * self._excess(fitted) < self._excess(found):
+                return self.with_less_friction(fitted)
         return found
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, trial
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shaped, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, fit
 from emir_analysis.signals import Array
@@ -18,6 +18,7 @@ from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 GROWTH = 1.5  # of a beginning from one to the next
+DECIDED = 20.0  # s, of the beginning on which one of two starts is chosen
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
 
@@ -43,29 +44,47 @@ def fullest(known: Trial, sheet: Sheet) -> Trial:
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
-    """Return trials with less friction, where it is not beyond doubt: not viscous, or Coulomb's."""
+    """Return trials with less friction: without the viscous one, without a break-away."""
     found = []
-    if VISCOUS in full.effects and not full.told(VISCOUS, "coefficient"):
+    if VISCOUS in full.effects:
         found.append(full.without(VISCOUS))
-    if STRIBECK in full.effects and not full.told(STRIBECK, "breakaway", 1.0):
+    if STRIBECK in full.effects:
         found.append(_without_breakaway(full, sheet))
     return found
 
 
 def grown(start: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial to the free run of a beginning that grows to the whole."""
-    x = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
-    end, time = max(float(e.time[-1]) for e in evidence.experiments), FIRST
-    while time < end:
-        x = _fitted(start, evidence.until(time), x).x
-        time *= GROWTH
-    return start.continued(_fitted(start, evidence, x))
+    """Fit a trial to the free run of a beginning that grows to the whole.
+
+    It begins where it is told to, and with those shapes of its effects that are best over the
+    first beginning; which of both is better shows soon.
+    """
+    first = evidence.until(FIRST)
+    begins = [
+        _led(start, evidence, _at_rest(each, evidence), FIRST, DECIDED)
+        for each in (start, shaped(start, first))
+    ]
+    best = min(begins, key=lambda solution: solution.misfit)
+    end = max(float(e.time[-1]) for e in evidence.experiments)
+    return start.continued(_led(start, evidence, best.x, GROWTH * DECIDED, end))
 
 
 def further(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that is near the optimum to the free run of the whole."""
-    x = np.append(known.x, np.zeros(2 * len(evidence.experiments)))
-    return known.continued(_fitted(known, evidence, x))
+    return known.continued(_fitted(known, evidence, _at_rest(known, evidence)))
+
+
+def _at_rest(known: Trial, evidence: Evidence) -> Array:
+    """Return a trial's x and the states at rest, in the middle of what the sensors leave open."""
+    return np.append(known.x, np.zeros(2 * len(evidence.experiments)))
+
+
+def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
+    """Fit to beginnings that grow from a time to another, s."""
+    while time < end:
+        x = _fitted(known, evidence.until(time), x).x
+        time *= GROWTH
+    return _fitted(known, evidence.until(end), x)
 
 
 def _fitted(known: Trial, evidence: Evidence, x: Array) -> Solution:

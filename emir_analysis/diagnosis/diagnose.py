@@ -164,7 +164,8 @@ class Search:
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
             before[equal[0].effects] = equal
             best = self._known_whole(min(better, key=_free))
-            if sticks(best.trial) and self._excess(best.trial) > LEFT**2 - 1.0:
+            left = self._excess(best.trial)
+            if sticks(best.trial) and LEFT**2 - 1.0 < left < HOPELESS**2 - 1.0:
                 told = self._by_beginning(best)
                 equal = equal if told is best else [told.trial]
                 best = told

@@ -21,6 +21,7 @@ GROWTH = 1.5  # of a beginning from one to the next
 DECIDED = 20.0  # s, of the beginning on which one of two starts is chosen
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
+ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
@@ -71,7 +72,7 @@ def grown(start: Trial, evidence: Evidence) -> Trial:
 
 def further(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that is near the optimum to the free run of the whole."""
-    return known.continued(_fitted(known, evidence, _at_rest(known, evidence)))
+    return known.continued(_fitted(known, evidence, _at_rest(known, evidence), ROUGH))
 
 
 def _at_rest(known: Trial, evidence: Evidence) -> Array:
@@ -87,9 +88,9 @@ def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) ->
     return _fitted(known, evidence.until(end), x)
 
 
-def _fitted(known: Trial, evidence: Evidence, x: Array) -> Solution:
+def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:
     problem = free_run_problem(known, evidence, x)
-    return fit(replace(problem, coarse=None, step=SLOPE_STEP), ACCURACY)
+    return fit(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
 
 
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:

@@ -128,20 +128,20 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     polished. The state at rest at each recording's start (see `Starts`) is fitted along and then
     forgotten: it belongs to the recording, not to the machine.
     """
-    x = np.append(_shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
+    x = np.append(shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
     begins = [x]
     for share in GROWING:
-        begun = fit(_free_run_problem(start, evidence, share, begins[-1]), ROUGH)
+        begun = fit(free_run_problem(start, evidence, begins[-1], share), ROUGH)
         begins.append(begun.x)
     accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
     # what acts late is not told by the beginning, and may have been led astray there
-    whole = _free_run_problem(start, evidence, 1.0, x)
+    whole = free_run_problem(start, evidence, x)
     cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)
     best = begins[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))]
     return start.continued(fit(replace(whole, start=best), accuracy))
 
 
-def _shaped(start: Trial, evidence: Evidence) -> Trial:
+def shaped(start: Trial, evidence: Evidence) -> Trial:
     """Return the trial with those shapes of its effects whose free run is best."""
     for effect in start.effects:
         points = _shapes(start, effect)
@@ -189,7 +189,7 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
         np.zeros(2) if shown else _settled(known.machine, e, evidence) for e in evidence.experiments
     ]
     x = np.concatenate([known.x, *rest])
-    problem = _free_run_problem(known, evidence, 1.0, x)
+    problem = free_run_problem(known, evidence, x)
     near = fit(problem, ACCURACY)
     if near.misfit > HOPELESS:
         return known.continued(near)
@@ -197,7 +197,7 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     return known.continued(fit(fine, FINE_ACCURACY))
 
 
-def _free_run_problem(start: Trial, evidence: Evidence, share: float, x: Array) -> Problem:
+def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 1.0) -> Problem:
     """Return the free run of the first part of recordings as a problem.
 
     x: start, (k + 2 r,), the trial's and two numbers for the state at rest in each recording.

@@ -31,6 +31,7 @@ from emir_analysis.diagnosis.select import (
     rivals,
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
+from emir_analysis.diagnosis.stick_slip import VISCOUS, fullest, further, grown, simpler, sticks
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
@@ -139,6 +140,7 @@ class Search:
         self.refitted = fit_free_run(self.balanced, evidence)
         self.tried: list[Tried] = []
         self._whole: dict[tuple[str, ...], Trial] = {}
+        self._settled: tuple[str, ...] = ()  # effects that are known to be needed
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
@@ -162,6 +164,11 @@ class Search:
             equal = rivals([t.trial for t in better], [_free(t) for t in better])
             before[equal[0].effects] = equal
             best = self._known_whole(min(better, key=_free))
+            left = self._excess(best.trial)
+            if sticks(best.trial) and LEFT**2 - 1.0 < left < HOPELESS**2 - 1.0:
+                told = self._by_beginning(best)
+                equal = equal if told is best else [told.trial]
+                best = told
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
@@ -202,6 +209,8 @@ class Search:
             return chosen
         least = self._on_whole(self.whole(chosen)) + STRONG
         for effect in chosen.effects:
+            if effect in self._settled:
+                continue
             fewer = self.whole(chosen).without(effect)
             if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
                 continue
@@ -225,6 +234,38 @@ class Search:
         """
         near = self._excess(best.trial) < HOPELESS**2
         return replace(best, trial=self.whole(best.trial)) if near else best
+
+    def _by_beginning(self, best: Tried) -> Tried:
+        """Return a trial that sticks with the friction that a growing beginning tells.
+
+        The trial itself where that is no better on the whole.
+        """
+        self._progress(f"friction by a growing beginning: {best.trial.name}")
+        start = fit_balances(fullest(best.trial, self._sheet), self._evidence, self.floor)
+        found = grown(start, self._evidence)
+        if self._excess(found) > AT_NOISE**2 - 1.0:
+            # a law of the machine that the model has not is mimicked by several it has
+            found = grown(start.without(VISCOUS), self._evidence)
+        found = self.with_less_friction(found)
+        if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
+            return best
+        self._whole[found.effects] = found
+        self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
+        told = self._scored(found, free_run_score(found, self._evidence))
+        self.tried.append(told)
+        return told
+
+    def with_less_friction(self, found: Trial) -> Trial:
+        """Return a trial with as little friction as will do.
+
+        More has to take half of the rest away: a law that is a little off is mimicked by another.
+        """
+        for less in simpler(found, self._sheet):
+            fitted = further(less, self._evidence)
+            no_worse = self._on_whole(fitted) < self._on_whole(found) + STRONG
+            if no_worse or 0.5 * self._excess(fitted) < self._excess(found):
+                return self.with_less_friction(fitted)
+        return found
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.

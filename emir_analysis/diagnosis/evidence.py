@@ -43,6 +43,10 @@ class Evidence:
         """Return the first part of every recording."""
         return Evidence([e.head(share) for e in self.experiments], self.stated)
 
+    def until(self, time: float) -> "Evidence":
+        """Return every recording up to a time, s."""
+        return Evidence([e.until(time) for e in self.experiments], self.stated)
+
     @property
     def time(self) -> Array:
         """Middle of the balances' windows, (w,) s, one recording behind the other."""

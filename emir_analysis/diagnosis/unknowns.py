@@ -42,6 +42,12 @@ class Unknown:
             return self.origin * math.exp(x)
         return self.origin + self.scale * x
 
+    def at(self, value: float) -> float:
+        """Return the x of a value, SI unit."""
+        if self.logarithmic:
+            return math.log(value / self.origin)
+        return (value - self.origin) / self.scale
+
     def deviation(self, x: float, width: float) -> tuple[float, float]:
         """Return the values at x - width and x + width, inside the bounds."""
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))

@@ -1,0 +1,103 @@
+"""Machines that stick and slip: which friction it is, told by a beginning that grows.
+
+Over a long run each instant of sticking shifts the next, and the error is a rough function of all
+parameters: a fit ends close to where it began. Over a few seconds it is smooth, and from there on
+the fit is led along. How friction falls behind the break-away and rises with speed lies between
+two windows of the balances, so the fullest law is fitted, and what is not needed is left out.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shaped, trial
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fit import Solution, fit
+from emir_analysis.signals import Array
+from emir_plant.sheet import Sheet
+
+FIRST = 3.0  # s, of the first beginning
+GROWTH = 1.5  # of a beginning from one to the next
+DECIDED = 20.0  # s, of the beginning on which one of two starts is chosen
+SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
+ACCURACY = 1e-4  # relative, of the free run's squared error
+ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
+
+COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
+DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
+
+
+def sticks(known: Trial) -> bool:
+    """Tell whether a trial has dry friction."""
+    return any(name in DRY for name in known.effects)
+
+
+def fullest(known: Trial, sheet: Sheet) -> Trial:
+    """Return a trial with the friction that has all others in it but the load's.
+
+    The maker's parameters are as stated again: instants of sticking have led them astray.
+    """
+    for name in known.effects:
+        if name in {*DRY, VISCOUS}:
+            known = known.without(name)
+    known = known.at(np.where(known.unknowns.toleranced, 0.0, known.x))
+    return trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
+
+
+def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
+    """Return trials with less friction: without the viscous one, without a break-away."""
+    found = []
+    if VISCOUS in full.effects:
+        found.append(full.without(VISCOUS))
+    if STRIBECK in full.effects:
+        found.append(_without_breakaway(full, sheet))
+    return found
+
+
+def grown(start: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial to the free run of a beginning that grows to the whole.
+
+    It begins where it is told to, and with those shapes of its effects that are best over the
+    first beginning; which of both is better shows soon.
+    """
+    first = evidence.until(FIRST)
+    begins = [
+        _led(start, evidence, _at_rest(each, evidence), FIRST, DECIDED)
+        for each in (start, shaped(start, first))
+    ]
+    best = min(begins, key=lambda solution: solution.misfit)
+    end = max(float(e.time[-1]) for e in evidence.experiments)
+    return start.continued(_led(start, evidence, best.x, GROWTH * DECIDED, end))
+
+
+def further(known: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial that is near the optimum to the free run of the whole."""
+    return known.continued(_fitted(known, evidence, _at_rest(known, evidence), ROUGH))
+
+
+def _at_rest(known: Trial, evidence: Evidence) -> Array:
+    """Return a trial's x and the states at rest, in the middle of what the sensors leave open."""
+    return np.append(known.x, np.zeros(2 * len(evidence.experiments)))
+
+
+def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
+    """Fit to beginnings that grow from a time to another, s."""
+    while time < end:
+        x = _fitted(known, evidence.until(time), x).x
+        time *= GROWTH
+    return _fitted(known, evidence.until(end), x)
+
+
+def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:
+    problem = free_run_problem(known, evidence, x)
+    return fit(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
+
+
+def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:
+    values, others = full.unknowns.values(full.x), full.without(STRIBECK)
+    found = trial(sheet, (*others.effects, COULOMB), others)
+    x = found.x.copy()
+    for k, unknown in enumerate(found.unknowns.members):
+        if unknown.path.startswith(f"effects.{COULOMB}."):
+            x[k] = unknown.at(values[unknown.path.replace(COULOMB, STRIBECK)])
+    return found.at(x)

@@ -1,0 +1,46 @@
+"""The friction of a machine that sticks and slips, from a beginning that grows."""
+
+import numpy as np
+import pytest
+from test_diagnosis_search import search
+
+from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
+from emir_analysis.diagnosis.stick_slip import fullest, grown
+
+HIDDEN = {
+    "effects.stribeck_friction.force": 2e4,
+    "effects.stribeck_friction.breakaway": 1.6,
+    "effects.stribeck_friction.stribeck_speed": 5e-3,
+    "effects.stribeck_friction.smoothing_speed": 3e-4,
+    "effects.viscous_friction.coefficient": 8e4,
+}
+SLIDING = {
+    "effects.coulomb_friction.force": 2e4,
+    "effects.coulomb_friction.smoothing_speed": 1e-3,
+}
+
+
+def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
+    """Begun without any knowledge of the break-away, the fit ends at what was hidden."""
+    searched, sheet, evidence = search(HIDDEN)
+    known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
+    start = fit_balances(fullest(known, sheet), evidence, searched.floor)
+    found = grown(start, evidence)
+    errors = np.concatenate(free_run_errors(found.machine, evidence))
+    assert np.sqrt(np.mean(errors**2)) < 1.05
+    stribeck = found.machine.effects.stribeck_friction
+    assert stribeck.force == pytest.approx(2e4, rel=0.03)
+    assert stribeck.breakaway == pytest.approx(1.6, rel=0.05)
+    assert found.machine.effects.viscous_friction.coefficient == pytest.approx(8e4, rel=0.05)
+    assert searched.with_less_friction(found) is found
+
+
+def test_no_more_friction_stays_than_there_is() -> None:
+    """A machine with Coulomb friction alone."""
+    searched, sheet, evidence = search(SLIDING)
+    start = fit_balances(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
+    fitted = searched.with_less_friction(grown(start, evidence))
+    assert fitted.effects == ("coulomb_friction",)
+    errors = np.concatenate(free_run_errors(fitted.machine, evidence))
+    assert np.sqrt(np.mean(errors**2)) < 1.05
+    assert fitted.machine.effects.coulomb_friction.force == pytest.approx(2e4, rel=0.03)

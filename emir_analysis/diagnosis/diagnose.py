@@ -37,6 +37,7 @@ from emir_analysis.diagnosis.stick_slip import (
     fullest,
     further,
     grown,
+    nested,
     simpler,
     sticks,
 )
@@ -169,9 +170,9 @@ class Search:
             better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
-            equal = rivals([t.trial for t in better], [_free(t) for t in better])
+            equal = _as_good(better)
             before[equal[0].effects] = equal
-            best = self._known_whole(min(better, key=_free))
+            best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             left = self._excess(best.trial)
             if sticks(best.trial) and LEFT**2 - 1.0 < left < HOPELESS**2 - 1.0:
                 told = self._by_beginning(best)
@@ -184,7 +185,7 @@ class Search:
             self._progress("pairs of effects")
             better = self._better(self._on_balances(self._pairs(plain, best), best), best)
             if better:
-                equal = rivals([t.trial for t in better], [_free(t) for t in better])
+                equal = _as_good(better)
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
 
@@ -241,7 +242,7 @@ class Search:
         reason to look for another effect. What sticks and leaves much even there is not led to
         the optimum so.
         """
-        if sticks(best.trial) and _excess(best.trial, self._head) > AT_NOISE**2 - 1.0:
+        if sticks(best.trial) and not _at_noise(best.trial, self._head):
             return best
         near = self._excess(best.trial) < HOPELESS**2
         return replace(best, trial=self.whole(best.trial)) if near else best
@@ -255,6 +256,8 @@ class Search:
         begin = self._evidence.until(DECIDED)
         start = fit_balances(fullest(best.trial, self._sheet), begin, self.floor)
         law = self.with_less_friction(begun(start, self._evidence), begin)
+        if set(law.effects) == set(best.trial.effects) and _at_noise(best.trial, self._evidence):
+            return best
         found = grown(law, self._evidence)
         if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
             return best
@@ -370,6 +373,22 @@ def _excess(tried: Trial, evidence: Evidence) -> float:
     """
     errors = np.concatenate(free_run_errors(tried.machine, evidence))
     return float(np.mean(errors**2) - 1.0)
+
+
+def _at_noise(tried: Trial, evidence: Evidence) -> bool:
+    return _excess(tried, evidence) <= AT_NOISE**2 - 1.0
+
+
+def _as_good(better: list[Tried]) -> list[Trial]:
+    """Return the best trial and those that are as good.
+
+    Of two of which one is the other without a break-away the one with fewer parameters: it would
+    be as good whatever the recordings are.
+    """
+    equal = rivals([t.trial for t in better], [_free(t) for t in better])
+    best = next((less for less in equal[1:] if nested(equal[0], less)), equal[0])
+    others = [t for t in equal[1:] if t is not best and t.x.size <= best.x.size]
+    return [best, *others]
 
 
 def _free(tried: Tried) -> float:

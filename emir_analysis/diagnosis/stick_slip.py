@@ -18,7 +18,7 @@ from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 GROWTH = 1.5  # of a beginning from one to the next
-DECIDED = FIRST * GROWTH**3  # s, of the beginning that chooses among starts and laws: 10 s
+DECIDED = 10.0  # s, of the beginning that chooses among starts and laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
 ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
@@ -31,6 +31,12 @@ DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 def sticks(known: Trial) -> bool:
     """Tell whether a trial has dry friction."""
     return any(name in DRY for name in known.effects)
+
+
+def nested(full: Trial, less: Trial) -> bool:
+    """Tell whether one trial's friction is another's with a break-away of 1: Coulomb's."""
+    without = {COULOMB if name == STRIBECK else name for name in full.effects}
+    return full.effects != less.effects and without == set(less.effects)
 
 
 def fullest(known: Trial, sheet: Sheet) -> Trial:
@@ -71,7 +77,7 @@ def begun(start: Trial, evidence: Evidence) -> Trial:
 def grown(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole."""
     end = max(float(e.time[-1]) for e in evidence.experiments)
-    return known.continued(_led(known, evidence, _at_rest(known, evidence), GROWTH * DECIDED, end))
+    return known.continued(_led(known, evidence, _at_rest(known, evidence), DECIDED, end))
 
 
 def further(known: Trial, evidence: Evidence) -> Trial:

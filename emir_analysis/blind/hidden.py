@@ -560,7 +560,7 @@ class SensorDelay(Hidden):
     def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
         super().__init__(numbers, sizes)
         self._lagging = self.slot()
-        drawn = next(name for name in self.grows if name in self.sizes)
+        drawn = next(name for name in SensorDelay.grows if name in self.sizes)
         self._sensor = drawn.removeprefix("lag_")
         self._time = self.sizes[drawn]
         self._unit = 1e5 if "pressure" in drawn else 1e-3  # of the memory

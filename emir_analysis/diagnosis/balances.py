@@ -68,6 +68,7 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
+DRAWN = 60.0  # s of the sensors' noise, about, from which the floor is found
 
 
 class Balances:
@@ -272,23 +273,28 @@ def _integral(rate: Array, period: float) -> Array:
 
 
 def noise_floor(experiment: Experiment, machine: Machine) -> Array:
-    """Return the residuals, (w, 5), that the sensors alone leave in each balance.
+    """Return the residuals, (d w, 5), that the sensors alone leave in each balance, in d draws.
 
     Found by simulating the machine under the recorded command, reading it through the sensors'
-    noise and quantisation, and computing its balances with its own parameters. Raises InputError
-    where the machine cannot rest as the recording starts.
+    noise and quantisation, and computing its balances with its own parameters. Of a short
+    recording several times: a few windows are uncertain, and how much the resolver's steps make
+    depends on where in a step the boom rests. Raises InputError where the machine cannot rest as
+    the recording starts.
     """
     angle, pressure = experiment.start()
-    start = (angle, machine.supply.pT if np.isnan(pressure) else pressure)
-    ideal = free_runs([machine], experiment, [start])[0]
+    pressure = machine.supply.pT if np.isnan(pressure) else pressure
+    draws = max(1, round(DRAWN / float(experiment.time[-1])))
+    step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
+    inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
+    ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])
     if not np.all(np.isfinite(ideal)):
         raise InputError(
             f"{experiment.name}: the data sheet's machine cannot rest at"
             f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound;"
             " check the data sheet"
         )
-    left: Array = Balances(sensed(experiment, machine, ideal), machine).residuals([machine])[0]
-    return left
+    seen = [sensed(experiment, machine, run, seed) for seed, run in enumerate(ideal)]
+    return np.concatenate([Balances(each, machine).residuals([machine])[0] for each in seen])
 
 
 def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:

@@ -286,7 +286,7 @@ def coarse_errors(
     evidence: Evidence,
     starts: Sequence[tuple[float, float]] | None = None,
 ) -> Array:
-    """Return errors in units of the noise, (m, n), of coarse free runs of all recordings.
+    """Return weighted errors in units of the noise, (m, n), of coarse free runs of all recordings.
 
     starts: angle, rad, and p_S, Pa, at rest in each recording; as the sensors show when not given.
     """
@@ -332,7 +332,7 @@ def _free_run_errors(
     *,
     coarse: bool = False,
 ) -> Array:
-    """Return errors in units of the noise, one row for each machine."""
+    """Return weighted errors in units of the noise, one row for each machine."""
     runs = free_runs(machines, experiment, starts, coarse=coarse)[:, :, ANGLE + 1 :]
-    error = (runs - experiment.outputs)[:, :, evidence.shown] / evidence.sensors[evidence.shown]
-    return np.asarray(error.reshape(len(machines), -1))
+    error = (runs - experiment.outputs) * experiment.weights / evidence.sensors
+    return np.asarray(error[:, :, evidence.shown].reshape(len(machines), -1))

@@ -22,13 +22,13 @@ from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run,
 from emir_analysis.diagnosis.select import (
     EXPLAINED,
     SEEN,
-    SPEAKS,
     STRONG,
     balance_score,
     explained,
     free_run_score,
     quiet,
     rivals,
+    speaks,
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.stick_slip import (
@@ -50,14 +50,14 @@ LEFT = 1.03  # the same of all signals together, from which on a further effect 
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
-CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
+CLOSE = 15.0 * STRONG  # of the best score on the balances, within which the free run decides
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A trial and its scores on the unseen part; smaller is better.
+    """A trial and its scores on the balances and on the unseen free run; smaller is better.
 
     free_run: None where the balances already spoke against it.
     """
@@ -106,14 +106,15 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if final.effects:
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
     floor = evidence.floor(final.machine)
-    good = quiet(level(after), floor) and explained(free_run_errors(final.machine, evidence))
+    good = quiet(level(after), floor, evidence)
+    good = good and explained(free_run_errors(final.machine, evidence))
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
         refitted = final = search.whole(final)
     if verdict == "unexplained":
         final, after = refitted, unaided
         floor = evidence.floor(final.machine)
-    speaking = loudest(after, floor)
+    speaking = loudest(after, floor, evidence)
     return Findings(
         evidence=evidence,
         sheet=sheet,
@@ -133,8 +134,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
 class Search:
     """Forward selection, then backward elimination.
 
-    Effects are added one at a time, as long as the unseen part gets better; then those go without
-    which the whole is explained as well.
+    Effects are added one at a time, as long as the unseen free run gets better; then those go
+    without which the whole is explained as well.
 
     tried: all trials. balanced, refitted: the parameters alone, fitted to the balances and to the
     free run of the whole recordings.
@@ -155,7 +156,7 @@ class Search:
         """Return the best trial and those that are as good."""
         errors = free_run_errors(self.refitted.machine, self._evidence)
         at_noise = rms(np.concatenate(errors)) <= AT_NOISE
-        if np.all(at_noise) and quiet(self._left(self.balanced), self.floor):
+        if np.all(at_noise) and self._quiet(self.balanced):
             self.tried = [self._scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
         plain = self._scored(
@@ -321,7 +322,10 @@ class Search:
         return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
 
     def _on_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
-        """Fit trials to the balances; return those that come close to the best of them."""
+        """Fit trials to the balances; return those that come close to the best of them.
+
+        And the one that is ahead in the free run already.
+        """
         known = {frozenset(tried.trial.effects) for tried in self.tried}
         new = []
         for screened in found:
@@ -336,8 +340,22 @@ class Search:
         limit = min(best.balances - STRONG, least + CLOSE)
         close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
         promising = close[:MOST_SIMULATED]
+        promising += [t for t in self._ahead(round_, best) if t not in promising]
         self.tried += [t for t in round_ if t not in promising]
         return promising
+
+    def _ahead(self, round_: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial whose free run is best, if it is better than the best so far.
+
+        Though it is fitted to the balances alone: a free run adds up what they hardly know of,
+        such as a small leak.
+        """
+        least, ahead = _free(best) - STRONG, []
+        for tried in round_:
+            score = free_run_score(tried.trial, self._evidence)
+            if score < least:
+                least, ahead = score, [tried]
+        return ahead
 
     def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
         """Fit trials to the free run; return those that are better than the best so far."""
@@ -351,19 +369,17 @@ class Search:
 
     def _enough(self, tried: Trial) -> bool:
         """Tell whether a trial leaves no balance speaking and explains the free run."""
-        floor = self._evidence.floor(tried.machine)
-        return quiet(self._left(tried), floor) and explained(
-            free_run_errors(tried.machine, self._evidence)
-        )
+        return self._quiet(tried) and explained(free_run_errors(tried.machine, self._evidence))
+
+    def _quiet(self, tried: Trial) -> bool:
+        left = level(self._evidence.residuals([tried.machine])[0])
+        return quiet(left, self._evidence.floor(tried.machine), self._evidence)
 
     def _excess(self, tried: Trial) -> float:
         return _excess(tried, self._evidence)
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
-
-    def _left(self, tried: Trial) -> Array:
-        return level(self._evidence.residuals([tried.machine])[0])
 
 
 def _excess(tried: Trial, evidence: Evidence) -> float:
@@ -403,13 +419,13 @@ def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:
     return "ambiguous" if rival_count else "found"
 
 
-def loudest(residual: Array, floor: Array) -> str | None:
+def loudest(residual: Array, floor: Array, evidence: Evidence) -> str | None:
     """Return the balance that is furthest above its noise, if one speaks.
 
     A missing force bends the boom too, so the bending counts only where nothing else speaks.
     """
     loudness = dict(zip(BALANCES, level(residual) / floor, strict=True))
-    loud = [name for name, ratio in loudness.items() if ratio > SPEAKS]
+    loud = [name for name, ratio in loudness.items() if ratio > speaks(evidence)]
     first = [name for name in loud if name != "bending"]
     return max(first or loud, key=loudness.__getitem__, default=None)
 

@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.balances import (
-    FORCE_WINDOW,
     LINKAGE,
     Balances,
     available,
@@ -35,7 +33,7 @@ class Evidence:
         self.sensors = np.where(shown, noise(stated), np.nan)
         self.shown = shown
         self.told = available(self.measured)
-        self.fitted: NDArray[np.bool_] = self.told & (np.arange(self.told.size) != LINKAGE)
+        self.fitted = self.told & (np.arange(self.told.size) != LINKAGE)
         self._balances = [Balances(experiment, stated) for experiment in self.experiments]
         self.windows_of_first = self._balances[0].time.size
 
@@ -55,11 +53,6 @@ class Evidence:
             parts.append(balances.time + offset)
             offset += float(experiment.time[-1])
         return np.concatenate(parts)
-
-    def behind(self, share: float) -> NDArray[np.bool_]:
-        """Tell which windows lie behind the first part of their recording, (w,)."""
-        late = [b.time > share * b.time[-1] + FORCE_WINDOW for b in self._balances]
-        return np.concatenate(late)
 
     def duration(self, share: float) -> float:
         """Return the length of a share of all recordings, s."""

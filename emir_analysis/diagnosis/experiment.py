@@ -56,6 +56,17 @@ class Experiment:
         return self.period * np.arange(self.angle.size, dtype=np.float64)
 
     @property
+    def weights(self) -> Array:
+        """What each output's error counts in a fit, (n, 4): n readings that stay the same as one.
+
+        A resolver in one and the same step errs by the same part of it all the time.
+        """
+        changed = np.diff(self.outputs, axis=0, prepend=np.nan) != 0.0
+        since = np.cumsum(changed, axis=0) - 1
+        alike = [np.bincount(column)[column] for column in since.T]
+        return np.asarray(1.0 / np.sqrt(np.column_stack(alike)))
+
+    @property
     def every(self) -> int:
         """Steps of the command grid between two samples."""
         return round(self.period / COMMAND_STEP)

@@ -124,7 +124,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             "The band is twice the sensors' noise.",
         ),
     ]
-    if not quiet(level(findings.residuals["refitted"]), findings.floor):
+    if not quiet(level(findings.residuals["refitted"]), findings.floor, findings.evidence):
         figure, name = shape_picture(findings)
         blocks.append(
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")
@@ -153,8 +153,9 @@ def _candidates(result: Diagnosis) -> list[Block]:
         Table(
             ("effects", "balances", "free run"),
             rows,
-            "How much better than parameters only, on the last third of the recording, which the "
-            "fit had not seen: difference of the Bayesian information criterion, above 10 strong.",
+            "How much better than parameters only, in the free run on the last third of the "
+            "recording, which the fit had not seen: difference of the Bayesian information "
+            "criterion, above 10 strong.",
         ),
     ]
 

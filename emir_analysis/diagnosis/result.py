@@ -63,8 +63,8 @@ class EffectResult:
 class CandidateResult:
     """What was tried.
 
-    score: how much better than parameters only on the unseen part's balances, free_run: the same
-    of the free run where it was simulated; above 10 is strong evidence.
+    score: how much better than parameters only on the balances, free_run: the same of the unseen
+    part's free run where it was fitted; above 10 is strong evidence.
     """
 
     name: str

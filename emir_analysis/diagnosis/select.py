@@ -1,6 +1,7 @@
-"""Choosing among trials by their error on a part of the recordings that no fit has seen."""
+"""Choosing among trials: by the balances, then by a free run that no fit has seen."""
 
 import numpy as np
+from scipy.stats import chi2
 
 from emir_analysis.diagnosis.balances import FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors
@@ -10,6 +11,7 @@ from emir_analysis.signals import Array
 SEEN = 2.0 / 3.0  # share of each recording, from its start, that the fits see before the choice
 STRONG = 10.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
 SPEAKS = np.sqrt(2.0)  # times the floor: what is systematic is then larger than the noise
+CHANCE = 1e-3  # with which noise alone may make a balance of a short recording speak
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
 BLOCK = 1.0  # s: errors closer than this are not counted as independent
 
@@ -25,16 +27,14 @@ def score(mean_squares: Array, independent: float, unknowns: int) -> float:
 
 
 def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
-    """Score a trial on the windows of recordings behind the part that the fit has seen.
+    """Score a trial on the balances of whole recordings. Zero where the signals allow none.
 
-    Zero where the signals allow no balance.
+    Each window knows of its own time alone: what acted on the seen part is not in the others.
     """
     if not np.any(evidence.fitted):
         return 0.0
-    unseen = evidence.behind(SEEN)
-    missing = (evidence.residuals([trial.machine])[0] / floor)[unseen][:, evidence.fitted]
-    count = len(evidence.experiments)
-    independent = (evidence.duration(1.0 - SEEN) - count * FORCE_WINDOW) / BLOCK
+    missing = (evidence.residuals([trial.machine])[0] / floor)[:, evidence.fitted]
+    independent = (evidence.duration(1.0) - len(evidence.experiments) * FORCE_WINDOW) / BLOCK
     # as the fit counts them: far above the noise by their size, so that no window decides alone
     misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))
     return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
@@ -67,12 +67,21 @@ def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
     return [trials[best], *close]
 
 
-def quiet(left: Array, floor: Array) -> bool:
+def speaks(evidence: Evidence) -> float:
+    """Return the level in units of the floor from which on a balance speaks.
+
+    SPEAKS, but in a few windows noise alone may make more: chi-square of independent ones.
+    """
+    windows = evidence.duration(1.0) / FORCE_WINDOW
+    return max(float(SPEAKS), float(np.sqrt(chi2.isf(CHANCE, windows) / windows)))
+
+
+def quiet(left: Array, floor: Array, evidence: Evidence) -> bool:
     """Tell whether no balance holds more than its noise; left, floor: levels, (b,).
 
     NaN, a balance that the signals do not allow, is quiet.
     """
-    return not np.any(left > SPEAKS * floor)
+    return not np.any(left > speaks(evidence) * floor)
 
 
 def explained(errors: list[Array]) -> bool:

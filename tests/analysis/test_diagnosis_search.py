@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.diagnose import Search
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.select import STRONG, balance_score, speaks
 from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
@@ -56,6 +57,38 @@ def test_the_pressure_at_the_start_is_known_while_oil_leaks(samples: int) -> Non
         outputs[:, 2] = 25e5 + 13e5 * time + noise * random.standard_normal(100)
         found = Experiment("leak", time[1], np.zeros(0), time, outputs, samples).start()[1]
         assert abs(found - 25e5) < 4.5 * noise  # that seldom, of a line through two samples
+
+
+def test_readings_that_stay_the_same_count_as_one() -> None:
+    outputs = np.random.default_rng(1).standard_normal((6, 4))
+    outputs[:, 0] = [0.0, 1.0, 1.0, 1.0, 1.0, 0.0]
+    outputs[:, 3] = np.nan
+    shown = Experiment("steps", 0.01, np.zeros(0), np.zeros(6), outputs, 1)
+    assert shown.weights[:, 0] == pytest.approx([1.0, 0.5, 0.5, 0.5, 0.5, 1.0])
+    assert np.all(shown.weights[:, 1:] == 1.0)
+
+
+def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:
+    """No window of the last third knows of a load that acted from 2 to 6 s of 16 s."""
+    sizes = {"force": 1500.0, "frequency": 0.0, "phase": 0.0, "start": 2.0, "duration": 4.0}
+    pulse = {f"effects.external_load.{name}": value for name, value in sizes.items()}
+    searched, sheet, evidence = search(pulse)
+    plain = fit_balances(trial(sheet, ()), evidence, searched.floor)
+    loaded = trial(sheet, ("external_load",), plain)
+    further = loaded.unknowns.members[plain.x.size :]
+    loaded = loaded.at(np.append(plain.x, [u.at(pulse[u.path]) for u in further]))
+    scores = [balance_score(t, evidence, searched.floor) for t in (loaded, plain)]
+    assert scores[0] < scores[1] - STRONG
+
+
+def test_of_a_short_recording_a_balance_may_hold_more() -> None:
+    """Of 12 independent windows the mean square of noise is above 2.74 once in a thousand."""
+
+    def limit(duration: float) -> float:
+        return speaks(Evidence([run(joint1(), duration)], joint1()))
+
+    assert limit(12.0) ** 2 == pytest.approx(2.74, abs=0.02)  # chi-square tables: 32.91 / 12
+    assert limit(60.0) == pytest.approx(np.sqrt(2.0))
 
 
 def test_an_effect_that_is_not_needed_is_dropped() -> None:

@@ -2,6 +2,7 @@
 
 import ast
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -176,3 +177,12 @@ def test_two_effects_act_together() -> None:
     names = {"valve_null_offset.offset": 0.03, "internal_leakage.coefficient": 1e-11}
     for name, error in apart(run, of_plant(names, commands)).items():
         assert error < SIGNALS[name], name
+
+
+def test_any_two_effects_go_together_in_either_order() -> None:
+    random = np.random.default_rng(1)
+    for one, other in permutations(hidden.CATALOGUE, 2):
+        both: Any = type("Both", (one, other), {})
+        machine = both(STATED, one.draw(random) | other.draw(random))
+        x = machine.start(START.angle, START.p_s)
+        assert np.isfinite(machine.rates(x, 0.0, 0.0)).all(), (one.name, other.name)

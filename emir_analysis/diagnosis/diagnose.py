@@ -50,7 +50,7 @@ LEFT = 1.03  # the same of all signals together, from which on a further effect 
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
-CLOSE = 15.0 * STRONG  # of the best score on the balances, within which the free run decides
+CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
 Progress = Callable[[str], None]
 
@@ -184,7 +184,7 @@ class Search:
                 break
         if not enough and np.any(self._evidence.fitted):
             self._progress("pairs of effects")
-            better = self._better(self._on_balances(self._pairs(plain, best), best), best)
+            better = self._by_balances(self._pairs(plain, best), best)
             if better:
                 equal = _as_good(better)
         needed = self.needed(equal[0])
@@ -301,7 +301,7 @@ class Search:
         """
         if np.any(self._evidence.fitted):
             found = screen(best.trial, self._sheet, self._head, self.floor)
-            better = self._better(self._on_balances(found, best), best)
+            better = self._by_balances(found, best)
             if better or np.all(self._evidence.told):
                 return better
         return self._better(self._on_free_run(best), best)
@@ -321,10 +321,10 @@ class Search:
         found = screen_free_run(best.trial, self._sheet, self._head)
         return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
 
-    def _on_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
-        """Fit trials to the balances; return those that come close to the best of them.
+    def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
+        """Fit trials to the balances, those that come close to the best of them to the free run.
 
-        And the one that is ahead in the free run already.
+        Return what is better. Where none is, the one that is ahead in the free run already.
         """
         known = {frozenset(tried.trial.effects) for tried in self.tried}
         new = []
@@ -340,18 +340,23 @@ class Search:
         limit = min(best.balances - STRONG, least + CLOSE)
         close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
         promising = close[:MOST_SIMULATED]
-        promising += [t for t in self._ahead(round_, best) if t not in promising]
-        self.tried += [t for t in round_ if t not in promising]
-        return promising
+        others = [t for t in round_ if t not in promising]
+        better = self._better(promising, best)
+        if not better:
+            ahead = self._ahead(others, best)
+            others = [t for t in others if t not in ahead]
+            better = self._better(ahead, best)
+        self.tried += others
+        return better
 
-    def _ahead(self, round_: list[Tried], best: Tried) -> list[Tried]:
+    def _ahead(self, others: list[Tried], best: Tried) -> list[Tried]:
         """Return the trial whose free run is best, if it is better than the best so far.
 
         Though it is fitted to the balances alone: a free run adds up what they hardly know of,
         such as a small leak.
         """
         least, ahead = _free(best) - STRONG, []
-        for tried in round_:
+        for tried in others:
             score = free_run_score(tried.trial, self._evidence)
             if score < least:
                 least, ahead = score, [tried]

@@ -31,7 +31,16 @@ from emir_analysis.diagnosis.select import (
     speaks,
 )
 from emir_analysis.diagnosis.shape import Shape, best_shape
-from emir_analysis.diagnosis.stick_slip import VISCOUS, fullest, further, grown, simpler, sticks
+from emir_analysis.diagnosis.stick_slip import (
+    DECIDED,
+    begun,
+    fullest,
+    further,
+    grown,
+    nested,
+    simpler,
+    sticks,
+)
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
@@ -162,9 +171,9 @@ class Search:
             better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
-            equal = rivals([t.trial for t in better], [_free(t) for t in better])
+            equal = _as_good(better)
             before[equal[0].effects] = equal
-            best = self._known_whole(min(better, key=_free))
+            best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             left = self._excess(best.trial)
             if sticks(best.trial) and LEFT**2 - 1.0 < left < HOPELESS**2 - 1.0:
                 told = self._by_beginning(best)
@@ -177,7 +186,7 @@ class Search:
             self._progress("pairs of effects")
             better = self._by_balances(self._pairs(plain, best), best)
             if better:
-                equal = rivals([t.trial for t in better], [_free(t) for t in better])
+                equal = _as_good(better)
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
 
@@ -231,8 +240,11 @@ class Search:
         """Return a trial as the whole recordings have it, if it is near them.
 
         What the part that the fits see tells badly, such as how a drift goes on, is then no
-        reason to look for another effect.
+        reason to look for another effect. What sticks and leaves much even there is not led to
+        the optimum so.
         """
+        if sticks(best.trial) and not _at_noise(best.trial, self._head):
+            return best
         near = self._excess(best.trial) < HOPELESS**2
         return replace(best, trial=self.whole(best.trial)) if near else best
 
@@ -242,12 +254,12 @@ class Search:
         The trial itself where that is no better on the whole.
         """
         self._progress(f"friction by a growing beginning: {best.trial.name}")
-        start = fit_balances(fullest(best.trial, self._sheet), self._evidence, self.floor)
-        found = grown(start, self._evidence)
-        if self._excess(found) > AT_NOISE**2 - 1.0:
-            # a law of the machine that the model has not is mimicked by several it has
-            found = grown(start.without(VISCOUS), self._evidence)
-        found = self.with_less_friction(found)
+        begin = self._evidence.until(DECIDED)
+        start = fit_balances(fullest(best.trial, self._sheet), begin, self.floor)
+        law = self.with_less_friction(begun(start, self._evidence), begin)
+        if set(law.effects) == set(best.trial.effects) and _at_noise(best.trial, self._evidence):
+            return best
+        found = grown(law, self._evidence)
         if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
             return best
         self._whole[found.effects] = found
@@ -256,17 +268,18 @@ class Search:
         self.tried.append(told)
         return told
 
-    def with_less_friction(self, found: Trial) -> Trial:
-        """Return a trial with as little friction as will do.
+    def with_less_friction(self, known: Trial, begin: Evidence) -> Trial:
+        """Return a trial with as little friction as will do over a beginning.
 
         More has to take half of the rest away: a law that is a little off is mimicked by another.
         """
-        for less in simpler(found, self._sheet):
-            fitted = further(less, self._evidence)
-            no_worse = self._on_whole(fitted) < self._on_whole(found) + STRONG
-            if no_worse or 0.5 * self._excess(fitted) < self._excess(found):
-                return self.with_less_friction(fitted)
-        return found
+        limit = free_run_score(known, begin, seen=0.0) + STRONG
+        for less in simpler(known, self._sheet):
+            fitted = further(less, begin)
+            no_worse = free_run_score(fitted, begin, seen=0.0) < limit
+            if no_worse or 0.5 * _excess(fitted, begin) < _excess(known, begin):
+                return self.with_less_friction(fitted, begin)
+        return known
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.
@@ -368,15 +381,35 @@ class Search:
         return quiet(left, self._evidence.floor(tried.machine), self._evidence)
 
     def _excess(self, tried: Trial) -> float:
-        """Return the mean square of all signals' free-run errors beyond the noise, in its units.
-
-        Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
-        """
-        errors = np.concatenate(free_run_errors(tried.machine, self._evidence))
-        return float(np.mean(errors**2) - 1.0)
+        return _excess(tried, self._evidence)
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
+
+
+def _excess(tried: Trial, evidence: Evidence) -> float:
+    """Return the mean square of all signals' free-run errors beyond the noise, in its units.
+
+    Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
+    """
+    errors = np.concatenate(free_run_errors(tried.machine, evidence))
+    return float(np.mean(errors**2) - 1.0)
+
+
+def _at_noise(tried: Trial, evidence: Evidence) -> bool:
+    return _excess(tried, evidence) <= AT_NOISE**2 - 1.0
+
+
+def _as_good(better: list[Tried]) -> list[Trial]:
+    """Return the best trial and those that are as good.
+
+    Of two of which one is the other without a break-away the one with fewer parameters: it would
+    be as good whatever the recordings are.
+    """
+    equal = rivals([t.trial for t in better], [_free(t) for t in better])
+    best = next((less for less in equal[1:] if nested(equal[0], less)), equal[0])
+    others = [t for t in equal[1:] if t is not best and t.x.size <= best.x.size]
+    return [best, *others]
 
 
 def _free(tried: Tried) -> float:

@@ -18,9 +18,10 @@ from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 GROWTH = 1.5  # of a beginning from one to the next
-DECIDED = 20.0  # s, of the beginning on which one of two starts is chosen
+DECIDED = 10.0  # s, of the beginning that chooses among starts and laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
+ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
 ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
@@ -30,6 +31,12 @@ DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 def sticks(known: Trial) -> bool:
     """Tell whether a trial has dry friction."""
     return any(name in DRY for name in known.effects)
+
+
+def nested(full: Trial, less: Trial) -> bool:
+    """Tell whether one trial's friction is another's with a break-away of 1: Coulomb's."""
+    without = {COULOMB if name == STRIBECK else name for name in full.effects}
+    return full.effects != less.effects and without == set(less.effects)
 
 
 def fullest(known: Trial, sheet: Sheet) -> Trial:
@@ -54,24 +61,27 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     return found
 
 
-def grown(start: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial to the free run of a beginning that grows to the whole.
+def begun(start: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial to the free run of a beginning that grows to DECIDED.
 
     It begins where it is told to, and with those shapes of its effects that are best over the
-    first beginning; which of both is better shows soon.
+    first beginning; the better of both is returned.
     """
-    first = evidence.until(FIRST)
-    begins = [
+    fits = [
         _led(start, evidence, _at_rest(each, evidence), FIRST, DECIDED)
-        for each in (start, shaped(start, first))
+        for each in (start, shaped(start, evidence.until(FIRST)))
     ]
-    best = min(begins, key=lambda solution: solution.misfit)
+    return start.continued(min(fits, key=lambda solution: solution.misfit))
+
+
+def grown(known: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole."""
     end = max(float(e.time[-1]) for e in evidence.experiments)
-    return start.continued(_led(start, evidence, best.x, GROWTH * DECIDED, end))
+    return known.continued(_led(known, evidence, _at_rest(known, evidence), DECIDED, end))
 
 
 def further(known: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial that is near the optimum to the free run of the whole."""
+    """Fit a trial that is near the optimum."""
     return known.continued(_fitted(known, evidence, _at_rest(known, evidence), ROUGH))
 
 
@@ -83,7 +93,7 @@ def _at_rest(known: Trial, evidence: Evidence) -> Array:
 def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
     """Fit to beginnings that grow from a time to another, s."""
     while time < end:
-        x = _fitted(known, evidence.until(time), x).x
+        x = _fitted(known, evidence.until(time), x, ON_THE_WAY).x
         time *= GROWTH
     return _fitted(known, evidence.until(end), x)
 

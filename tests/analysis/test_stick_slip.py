@@ -5,7 +5,7 @@ import pytest
 from test_diagnosis_search import search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
-from emir_analysis.diagnosis.stick_slip import fullest, grown
+from emir_analysis.diagnosis.stick_slip import DECIDED, begun, fullest, grown, nested
 
 HIDDEN = {
     "effects.stribeck_friction.force": 2e4,
@@ -25,22 +25,37 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     searched, sheet, evidence = search(HIDDEN)
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
     start = fit_balances(fullest(known, sheet), evidence, searched.floor)
-    found = grown(start, evidence)
+    begin = evidence.until(DECIDED)
+    law = begun(start, evidence)
+    assert searched.with_less_friction(law, begin) is law
+    found = grown(law, evidence)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
     stribeck = found.machine.effects.stribeck_friction
     assert stribeck.force == pytest.approx(2e4, rel=0.03)
     assert stribeck.breakaway == pytest.approx(1.6, rel=0.05)
     assert found.machine.effects.viscous_friction.coefficient == pytest.approx(8e4, rel=0.05)
-    assert searched.with_less_friction(found) is found
 
 
 def test_no_more_friction_stays_than_there_is() -> None:
     """A machine with Coulomb friction alone."""
     searched, sheet, evidence = search(SLIDING)
     start = fit_balances(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
-    fitted = searched.with_less_friction(grown(start, evidence))
+    law = searched.with_less_friction(begun(start, evidence), evidence.until(DECIDED))
+    fitted = grown(law, evidence)
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
     assert fitted.machine.effects.coulomb_friction.force == pytest.approx(2e4, rel=0.03)
+
+
+def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:
+    """One law is the other with a parameter fixed, and no third one."""
+    _, sheet, _ = search(SLIDING)
+    coulomb, stribeck, viscous = (
+        trial(sheet, (f"{name}_friction",)) for name in ("coulomb", "stribeck", "viscous")
+    )
+    assert nested(stribeck, coulomb)
+    assert not nested(coulomb, stribeck)
+    assert not nested(coulomb, coulomb)
+    assert not nested(stribeck, viscous)

@@ -346,6 +346,8 @@ def _figures(words: list[str]) -> int:
 
 
 def _diagnose(words: list[str]) -> int:
+    # before numpy: matrices here are small, and threads cost more than they gain
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from emir_analysis.diagnosis import actuator, command, summary
     from emir_plant.actuator import is_actuator
 

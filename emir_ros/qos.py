@@ -75,7 +75,7 @@ def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:
 
     In lock step only the latest sample of a sensor is kept: the plant sends nothing newer before
     the one that starts a period was answered. Those between two periods are then replaced before
-    the node is called for them, which saves a fifth of the whole graph's time.
+    the node is called for them.
     """
     profile = offered(lockstep=lockstep)
     if topic.quality == "sensor":

@@ -1,24 +1,29 @@
 """Machines that stick and slip: which friction it is, told by a beginning that grows.
 
 Over a long run each instant of sticking shifts the next, and the error is a rough function of all
-parameters: a fit ends close to where it began. Over a few seconds it is smooth, and from there on
-the fit is led along. How friction falls behind the break-away and rises with speed lies between
-two windows of the balances, so the fullest law is fitted, and what is not needed is left out.
+parameters: a fit ends close to where it began. Over a few seconds it is smooth with a handful of
+minima: there the fit is begun from many shapes of the friction, and the best is led along. How
+friction falls behind the break-away and rises with speed lies between two windows of the balances,
+so the fullest law is fitted, and what is not needed is left out.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shaped, trial
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, fit
+from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
+STARTS = 12  # shapes near standstill from which the first beginning is fitted
 GROWTH = 1.5  # of a beginning from one to the next
-DECIDED = 10.0  # s, of the beginning that chooses among starts and laws
+LEAP = 3.0  # the same where the free run follows the machine until then
+FOLLOWS = 1.2  # times the error so far: the most over the longer beginning that it follows
+DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
 ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
@@ -64,14 +69,14 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
 def begun(start: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 
-    It begins where it is told to, and with those shapes of its effects that are best over the
-    first beginning; the better of both is returned.
+    Over the first beginning it is fitted from those shapes of the friction near standstill whose
+    free run is best there; the best of these fits is led on.
     """
-    fits = [
-        _led(start, evidence, _at_rest(each, evidence), FIRST, DECIDED)
-        for each in (start, shaped(start, evidence.until(FIRST)))
-    ]
-    return start.continued(min(fits, key=lambda solution: solution.misfit))
+    first = evidence.until(FIRST)
+    starts = shapes(start, STRIBECK, first)[:STARTS]
+    fits = [_fitted(each, first, _at_rest(each, evidence), ROUGH) for each in starts]
+    best = min(fits, key=lambda solution: solution.misfit)
+    return start.continued(_led(start, evidence, best.x, FIRST, DECIDED))
 
 
 def grown(known: Trial, evidence: Evidence) -> Trial:
@@ -94,8 +99,22 @@ def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) ->
     """Fit to beginnings that grow from a time to another, s."""
     while time < end:
         x = _fitted(known, evidence.until(time), x, ON_THE_WAY).x
-        time *= GROWTH
+        time = _next(known, evidence, x, time)
     return _fitted(known, evidence.until(end), x)
+
+
+def _next(known: Trial, evidence: Evidence, x: Array, time: float) -> float:
+    """Return the end, s, of the beginning that follows the one to which a trial is fitted.
+
+    As long as the instants of sticking are the machine's, there is no need of small steps.
+    """
+    far = evidence.until(LEAP * time)
+    limit = FOLLOWS * _misfit(known, evidence.until(time), x)
+    return (LEAP if _misfit(known, far, x) < limit else GROWTH) * time
+
+
+def _misfit(known: Trial, evidence: Evidence, x: Array) -> float:
+    return float(rms(free_run_problem(known, evidence, x).model(x[None])[0]))
 
 
 def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:

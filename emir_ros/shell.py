@@ -7,7 +7,7 @@ runs as fast as it can and the result does not depend on how fast that is.
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock
@@ -67,6 +67,7 @@ class Shell(LifecycleNode):
 
     hears_everybody = False  # and shall take what has arrived before it ends
     heard = 0  # messages so far, of such a node
+    taken_in_turn = False  # its messages, by `spin_in_turn`
 
     def __init__(
         self,
@@ -153,6 +154,11 @@ class Shell(LifecycleNode):
             qos_overriding_options=qos.overridable(lockstep=self.lockstep),
             raw=True,
         )
+
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """Return the subscriptions that an executor shall look after."""
+        return iter(()) if self.taken_in_turn else super().subscriptions
 
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""

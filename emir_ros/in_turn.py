@@ -16,7 +16,7 @@ from rclpy.task import Future
 from emir_ros.main import StopRequest
 from emir_ros.shell import Shell
 
-LOOK_PERIOD = 0.02  # s, between two looks at the executor while messages keep coming
+LOOK_PERIOD = 0.05  # s, between two looks at the executor while messages keep coming
 REST = 0.001  # s, that it may wait for something when none came
 
 

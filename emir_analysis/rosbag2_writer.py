@@ -11,8 +11,9 @@ from typing import Any, Self
 
 import yaml
 from mcap.records import Attachment, Schema
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
+from emir_analysis.mcap_writer import MessageWriter
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 
@@ -64,18 +65,11 @@ class _Span:
     def duration(self) -> int:
         return 0 if self.start is None else self.end - self.start
 
-    def add(self, time: int) -> None:
-        self.count += 1
-        if self.start is None or time < self.start:
-            self.start = time
-        if time > self.end:  # noqa: PLR1730 (max() takes four times as long)
-            self.end = time
-
     def add_all(self, other: "_Span") -> None:
         if other.start is not None:
-            self.add(other.start)
-            self.add(other.end)
-            self.count += other.count - 2
+            self.count += other.count
+            self.start = other.start if self.start is None else min(self.start, other.start)
+            self.end = max(self.end, other.end)
 
 
 class _File:
@@ -83,12 +77,17 @@ class _File:
 
     def __init__(self, path: Path, compression: CompressionType) -> None:
         self.path = path
-        self.span = _Span()
         self.stream = path.open("wb")
-        self.writer = Writer(self.stream, chunk_size=CHUNK, compression=compression)
+        self.writer = MessageWriter(self.stream, CHUNK, compression)
         self.writer.start(profile="ros2", library=f"emir {software_version()}")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
+
+    @property
+    def span(self) -> _Span:
+        found = self.writer.statistics
+        start = found.message_start_time if found.message_count else None
+        return _Span(found.message_count, start, found.message_end_time)
 
     def announce(self, topic: Topic) -> None:
         schema = topic.schema
@@ -109,7 +108,6 @@ class _File:
     def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
         number = self._channels[topic.name]
         self.writer.add_message(number, log_time, data, publish_time, topic.count)
-        self.span.add(log_time)
 
     def finish(self) -> None:
         self.writer.finish()  # type: ignore[no-untyped-call]  # mcap's, untyped

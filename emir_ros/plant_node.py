@@ -20,7 +20,7 @@ from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachi
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
-from emir_ros.wire import Wire, clock_message, publish_bytes, stamp_ns
+from emir_ros.wire import Wire, clock_message, sender, stamp_ns
 
 ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
@@ -53,7 +53,6 @@ class PlantNode(Shell):
         self.own = declare_tree(self, PlantNodeParameters())
         kind: Any = RobotMachine if robot else Joint1Machine
         self.machine: Machine = kind(self, self.own.initial_pressure_lowering)
-        self._topics = ROBOT_OUTPUTS if robot else JOINT1_OUTPUTS
         self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
         reject_unknown(self)
         self.tick = 0
@@ -86,9 +85,7 @@ class PlantNode(Shell):
         self.tick += 1
 
     def _publish_sensors(self, stamp: int) -> None:
-        signals = self.machine.signals(self.tick)
-        for topic in self._topics:
-            self.publish(topic, stamp, signals)
+        self.publish_all(stamp, self.machine.signals(self.tick))
         if self.tick % (CONTROL_PERIOD_NS // PLANT_PERIOD_NS) == 0:
             self.machine.show(stamp)
 
@@ -105,10 +102,8 @@ class PlantNode(Shell):
     # lock step: publish stamp t, wait for the answers to t, step until the next is due
 
     def _start_lockstep(self) -> None:
-        self._clock_publisher = self.create_publisher(
-            ClockMessage, "/clock", qos.offered(lockstep=True)
-        )
         profile = qos.offered(lockstep=True)
+        self._send_clock = sender(self.create_publisher(ClockMessage, "/clock", profile))
         self.create_subscription(Header, RECORDED, self._on_recorded, profile, raw=True)
         self.create_timer(0.5, self._check_patience, clock=self._wall)
         self._asked = time.monotonic()
@@ -116,7 +111,7 @@ class PlantNode(Shell):
 
     def _publish_tick(self) -> None:
         self.last_stamp = stamp = self.tick * PLANT_PERIOD_NS
-        publish_bytes(self._clock_publisher, clock_message(stamp))
+        self._send_clock(clock_message(stamp))
         self._publish_sensors(stamp)
 
     def _on_recorded(self, data: bytes) -> None:

@@ -9,6 +9,7 @@ clock otherwise), so a recorder that is killed outright loses no more than that.
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -50,7 +51,7 @@ from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
 from emir_ros.recorded_events import RecordedEvents
 from emir_ros.shell import NodeError, Shell
-from emir_ros.wire import header_message, publish_bytes, stamp_ns
+from emir_ros.wire import header_message, sender, stamp_ns
 
 EVENTS = 1000  # depth, as ROS has it for parameter events
 QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
@@ -78,12 +79,13 @@ class RecorderNode(Shell):
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
         self._writer = writer()
         self._writer.add_metadata("emir", json.loads(about))
-        self._ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
+        ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
+        self._acknowledge = sender(ack)
         self._failed = False
         self.changes = 0  # of parameters, recorded
         self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
         self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
-        self._pending: dict[int, dict[str, bytes]] = {}
+        self._pending: defaultdict[int, dict[str, bytes]] = defaultdict(dict)  # by stamp, full name
         self._next = 0
         for topic in self._topics:
             self._record(topic)
@@ -160,7 +162,11 @@ class RecorderNode(Shell):
         self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive_by_stamp(data: bytes) -> None:
-            self._on_stamp(topic, stamp_ns(data), data)
+            stamp = stamp_ns(data)
+            messages = self._pending[stamp]
+            messages[full_name] = data
+            if len(messages) == self._expected(stamp):
+                self._write_complete_stamps()
 
         def receive_by_clock(data: bytes) -> None:
             self.heard += 1
@@ -169,31 +175,26 @@ class RecorderNode(Shell):
         profile.depth = QUEUE
         self.hear(topic, receive_by_stamp if self.lockstep else receive_by_clock, profile)
 
-    def _on_stamp(self, topic: Topic, stamp: int, data: bytes) -> None:
-        self._pending.setdefault(stamp, {})[topic.name] = data
-        if stamp == self._next:
-            self._write_complete_stamps()
-
     def _write_complete_stamps(self) -> None:
-        while self._described and self._is_complete(self._next):
+        while self._described and len(self._pending[self._next]) == self._expected(self._next):
             self._write_stamp(self._next)
             if self._next % FLUSH_PERIOD_NS == 0:
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
-                publish_bytes(self._ack, header_message(self._next))
+                self._acknowledge(header_message(self._next))
             self._next += PLANT_PERIOD_NS
 
-    def _is_complete(self, stamp: int) -> bool:
-        expected = self._topics if stamp % CONTROL_PERIOD_NS == 0 else self._plant_topics
-        return len(self._pending.get(stamp, ())) == len(expected)
+    def _expected(self, stamp: int) -> int:
+        """Return how many topics have messages of that stamp."""
+        return len(self._topics if stamp % CONTROL_PERIOD_NS == 0 else self._plant_topics)
 
     def _write_stamp(self, stamp: int) -> None:
         messages = self._pending.pop(stamp)
-        for topic in self._topics:
-            if topic.name in messages:
-                full_name = self._full_names[topic.name]
-                self._write(full_name, messages[topic.name], stamp, stamp)
+        with self._watched():
+            for name in self._full_names.values():
+                if name in messages:
+                    self._writer.write(name, messages[name], stamp, stamp)
 
     def _on_answers(self, answers: dict[str, dict[str, Any]]) -> None:
         self._answers = answers

@@ -21,6 +21,7 @@ from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
+from emir_ros.in_turn import spin_in_turn
 from emir_ros.main import make_executor, spin, start_ros, take_the_rest
 from emir_ros.shell import NodeError, Shell
 
@@ -113,8 +114,13 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             for name in plan.nodes:
                 nodes[name] = _node_class(name)(ros)
                 nodes[name].ended.add_done_callback(lambda _: ended.set_result(None))
-                executor.add_node(nodes[name])
-            spin(executor, nodes["plant_node"], ended, stop)
+            recorder, *loops, plant = nodes.values()
+            if plan.lockstep:
+                spin_in_turn(executor, [plant, *loops, recorder], ended, stop)
+            else:
+                for node in nodes.values():
+                    executor.add_node(node)
+                spin(executor, plant, ended, stop)
             for node in nodes.values():
                 node.check()
             take_the_rest(executor, *nodes.values())

@@ -7,7 +7,7 @@ runs as fast as it can and the result does not depend on how fast that is.
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock
@@ -37,7 +37,7 @@ from emir_ros import qos
 from emir_ros.diagnostics import Beat, Diagnostics, Level
 from emir_ros.node_parameters import declare
 from emir_ros.orders import Orders
-from emir_ros.wire import Wire, publish_bytes, stamp_ns
+from emir_ros.wire import Wire, sender, stamp_ns
 
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
@@ -67,6 +67,7 @@ class Shell(LifecycleNode):
 
     hears_everybody = False  # and shall take what has arrived before it ends
     heard = 0  # messages so far, of such a node
+    taken_in_turn = False  # its messages, by `spin_in_turn`
 
     def __init__(
         self,
@@ -84,7 +85,7 @@ class Shell(LifecycleNode):
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
-        self._outputs: dict[str, tuple[Topic, Wire, Any]] = {}
+        self._outputs: dict[str, Callable[[int, Mapping[str, float]], None]] = {}
         self.last_stamp = -1  # ns, of the latest step in lock step
         self.diagnostics = Diagnostics(self, self.now_ns, lockstep=self.lockstep)
         self._offer(known[self.model])
@@ -107,7 +108,15 @@ class Shell(LifecycleNode):
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
         for topic in outputs:
-            self._outputs[topic.name] = (topic, Wire(topic), self._publisher(topic))
+            self._outputs[topic.name] = self._output(topic)
+
+    def _output(self, topic: Topic) -> Callable[[int, Mapping[str, float]], None]:
+        encode, send = Wire(topic).encode, sender(self._publisher(topic))
+
+        def publish(stamp: int, signals: Mapping[str, float]) -> None:
+            send(encode(stamp, signals))
+
+        return publish
 
     def _publisher(self, topic: Topic) -> Any:
         def late(_: Any) -> None:
@@ -154,10 +163,19 @@ class Shell(LifecycleNode):
             raw=True,
         )
 
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """Return the subscriptions that an executor shall look after."""
+        return iter(()) if self.taken_in_turn else super().subscriptions
+
     def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish a topic's signals, stamped in ns."""
-        _, wire, publisher = self._outputs[topic.name]
-        publish_bytes(publisher, wire.encode(stamp, signals))
+        self._outputs[topic.name](stamp, signals)
+
+    def publish_all(self, stamp: int, signals: Mapping[str, float]) -> None:
+        """Publish the signals of all topics that the node has, stamped in ns."""
+        for publish in self._outputs.values():
+            publish(stamp, signals)
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
@@ -315,7 +333,7 @@ class ControlNode(Shell):
         """Publish last what is published without inputs: the force loop shuts the valve."""
         instead = self.stale(["inactive"])
         if instead is not None:
-            self._publish_all(self.get_clock().now().nanoseconds, instead)
+            self.publish_all(self.get_clock().now().nanoseconds, instead)
         return super().on_deactivate(state)
 
     def standing_by(self, control: NodeControl) -> Stepping:
@@ -429,12 +447,12 @@ class ControlNode(Shell):
         what = f"{self.consequence}: " if instead is not None else ""
         self.diagnostics.say(Level.WARN if began else Level.ERROR, what + ", ".join(missing))
         if instead is not None:
-            self._publish_all(self.get_clock().now().nanoseconds, instead)
+            self.publish_all(self.get_clock().now().nanoseconds, instead)
 
     def _run(self, stamp: int, inputs: Any) -> None:
         signals = {name: value for group in inputs for name, value in group.items()}
         outputs = self.control(signals, self._period * 1e-9)
-        self._publish_all(stamp, outputs)
+        self.publish_all(stamp, outputs)
         if not self.lockstep:
             self._shown = signals
             self.diagnostics.counts["periods saturated"] += is_saturated(outputs)
@@ -455,7 +473,3 @@ class ControlNode(Shell):
     def status(self) -> str:
         """Return what there is to say while all is well."""
         return "running"
-
-    def _publish_all(self, stamp: int, signals: Signals) -> None:
-        for topic, _, _ in self._outputs.values():
-            self.publish(topic, stamp, signals)

@@ -7,7 +7,7 @@ the middleware's own leaves whatever was in memory between the fields.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from io import BytesIO
 from typing import Any
@@ -46,13 +46,14 @@ def header_message(stamp: int) -> bytes:
     return clock_message(stamp) + _NO_FRAME
 
 
-def publish_bytes(publisher: Any, data: bytes) -> None:
-    """Publish a serialized message, by the publisher's handle.
+def sender(publisher: Any) -> Callable[[bytes], None]:
+    """Return what publishes a serialized message, by the publisher's handle.
 
     What `Publisher.publish` does besides, to guard the handle and to tell bytes from messages,
     takes longer than sending.
     """
-    publisher.handle.publish_raw(data)
+    send: Callable[[bytes], None] = publisher.handle.publish_raw
+    return send
 
 
 class Wire:

@@ -12,7 +12,8 @@ from emir_analysis.signals import Array
 
 STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
-LEAST_STEP = 1e-5  # relative, of the vector: not met because steps that lead nowhere were cut
+HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
+LEAST_STEP = 1e-5  # relative, of the change: not met because steps that lead nowhere were cut
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
 
@@ -54,26 +55,33 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     accuracy: relative, of the cost. robust: residuals far above the noise count by their
     size, not by its square.
     """
-    held = np.flatnonzero(problem.stated)
     low, high = problem.low, problem.high
+    margin = 1e-6 * np.minimum(high - low, 1.0)
+    start = np.clip(problem.start, low + margin, high - margin)
+    # What neither data nor maker tell is held where it begins: with a singular Jacobian the
+    # trust region's step would be filled up with it, by an amount that rounding decides.
+    weight = np.where(problem.stated, 1.0 / TOLERANCE_SPREAD, HELD)
+    expected = np.where(problem.stated, 0.0, start)
 
-    def residuals(x: Array) -> Array:
-        return np.concatenate([problem.model(x[None])[0], x[held] / TOLERANCE_SPREAD])
+    def residuals(change: Array) -> Array:
+        x = start + change
+        return np.concatenate([problem.model(x[None])[0], weight * (x - expected)])
 
-    def jacobian(x: Array) -> Array:
+    def jacobian(change: Array) -> Array:
+        x = start + change
         steps = np.where(x + problem.step > high, -problem.step, problem.step)
         values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
         slopes = (values[1:] - values[0]) / steps[:, None]
-        prior = np.eye(x.size)[held] / TOLERANCE_SPREAD
         # a neighbour that cannot be simulated says nothing about the slope
-        return np.vstack([np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0), prior])
+        return np.vstack([np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0), np.diag(weight)])
 
-    margin = 1e-6 * np.minimum(high - low, 1.0)
+    # As a change from the start, since the trust region is at first as large as what it is given,
+    # or one for zero: where a fit begins is no measure of how far a first step may lead.
     result = least_squares(
         residuals,
-        np.clip(problem.start, low + margin, high - margin),
+        np.zeros_like(start),
         jac=jacobian,
-        bounds=(low, high),
+        bounds=(low - start, high - start),
         loss="soft_l1" if robust else "linear",
         xtol=LEAST_STEP,
         ftol=accuracy,
@@ -84,8 +92,10 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     # misfit beyond the noise widens the spread: the noise is not all that the model leaves
     excess = max(1.0, float(np.mean(np.square(result.fun))))
     covariance = inverse * excess
-    untold = np.flatnonzero(~np.any(curvature, axis=0))
+    untold = np.flatnonzero(~np.any(curvature[: -start.size], axis=0) & ~problem.stated)
     covariance[untold, untold] = np.inf
     return Solution(
-        np.asarray(result.x), covariance, math.sqrt(2.0 * result.cost / result.fun.size)
+        np.clip(start + result.x, low, high),
+        covariance,
+        math.sqrt(2.0 * result.cost / result.fun.size),
     )

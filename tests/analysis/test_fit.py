@@ -1,0 +1,58 @@
+"""Least squares of the diagnosis: what the data do not tell stays where it is."""
+
+import numpy as np
+import pytest
+
+from emir_analysis.diagnosis.fit import Problem, Solution, fit
+from emir_analysis.signals import Array
+
+SIZE = 9  # numbers to be fitted
+UNTOLD = [4, 7]  # those that the data do not depend on
+FAR = 20.0  # bounds of all
+
+
+def fitted(seed: int, untold: Array, *, stated: bool) -> tuple[Solution, Array, Array]:
+    """Fit random, slightly curved residuals; return truth, (k,), and slopes, (n, k), too.
+
+    untold: (2,) where the numbers without effect begin; stated: whether a maker states them.
+    """
+    random = np.random.default_rng(seed)
+    slopes = random.normal(size=(400, SIZE)) * np.logspace(3.0, 1.0, SIZE)
+    slopes[:, UNTOLD] = 0.0
+    true = random.normal(size=SIZE)
+    start = true + 0.01 * random.normal(size=SIZE)
+    start[UNTOLD] = untold
+
+    def model(points: Array) -> Array:
+        straight = (points - true) @ slopes.T
+        return np.asarray(straight + 1e-2 * np.sin(straight / 100.0))
+
+    held = np.zeros(SIZE, dtype=bool)
+    held[UNTOLD] = stated
+    low, high = np.full(SIZE, -FAR), np.full(SIZE, FAR)
+    return fit(Problem(model, start, low, high, held), 1e-3), true, slopes
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_numbers_without_effect_stay_where_they_begin(seed: int) -> None:
+    """They take no part in a step, however far the trust region reaches."""
+    untold = np.array([-3.0, 6.9])
+    solution, true, _ = fitted(seed, untold, stated=False)
+    true[UNTOLD] = untold
+    assert solution.x == pytest.approx(true, abs=1e-3)
+    assert np.all(np.isinf(np.diag(solution.covariance)[UNTOLD]))
+
+
+def test_what_a_maker_states_goes_back_to_that() -> None:
+    """The variance is then that of a tolerance: uniform, one wide to both sides."""
+    solution, _, _ = fitted(0, np.array([0.5, -0.7]), stated=True)
+    assert solution.x[UNTOLD] == pytest.approx(0.0, abs=1e-6)
+    assert np.diag(solution.covariance)[UNTOLD] == pytest.approx(1.0 / 3.0, rel=1e-3)
+
+
+def test_the_covariance_is_the_textbook_s() -> None:
+    """(J'J)^-1 for residuals in units of the noise."""
+    solution, _, slopes = fitted(0, np.zeros(2), stated=False)
+    told = np.setdiff1d(np.arange(SIZE), UNTOLD)
+    expected = np.linalg.inv(slopes[:, told].T @ slopes[:, told])
+    assert solution.covariance[np.ix_(told, told)] == pytest.approx(expected, rel=1e-2, abs=1e-9)

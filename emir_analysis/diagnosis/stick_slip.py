@@ -14,15 +14,12 @@ import numpy as np
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, fit
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 STARTS = 12  # shapes near standstill from which the first beginning is fitted
 GROWTH = 1.5  # of a beginning from one to the next
-LEAP = 3.0  # the same where the free run follows the machine until then
-FOLLOWS = 1.2  # times the error so far: the most over the longer beginning that it follows
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
@@ -99,22 +96,8 @@ def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) ->
     """Fit to beginnings that grow from a time to another, s."""
     while time < end:
         x = _fitted(known, evidence.until(time), x, ON_THE_WAY).x
-        time = _next(known, evidence, x, time)
+        time *= GROWTH
     return _fitted(known, evidence.until(end), x)
-
-
-def _next(known: Trial, evidence: Evidence, x: Array, time: float) -> float:
-    """Return the end, s, of the beginning that follows the one to which a trial is fitted.
-
-    As long as the instants of sticking are the machine's, there is no need of small steps.
-    """
-    far = evidence.until(LEAP * time)
-    limit = FOLLOWS * _misfit(known, evidence.until(time), x)
-    return (LEAP if _misfit(known, far, x) < limit else GROWTH) * time
-
-
-def _misfit(known: Trial, evidence: Evidence, x: Array) -> float:
-    return float(rms(free_run_problem(known, evidence, x).model(x[None])[0]))
 
 
 def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:

@@ -144,11 +144,16 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
 def shaped(start: Trial, evidence: Evidence) -> Trial:
     """Return the trial with those shapes of its effects whose free run is best."""
     for effect in start.effects:
-        points = _shapes(start, effect)
-        errors = coarse_errors([start.unknowns.at(x) for x in points], evidence)
-        cost = np.mean(np.square(errors), axis=1)
-        start = start.at(points[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))])
+        start = shapes(start, effect, evidence)[0]
     return start
+
+
+def shapes(start: Trial, effect: str, evidence: Evidence) -> list[Trial]:
+    """Return the trial with other shapes of an effect, those first whose free run is best."""
+    points = _shapes(start, effect)
+    errors = coarse_errors([start.unknowns.at(x) for x in points], evidence)
+    cost = np.mean(np.square(errors), axis=1)
+    return [start.at(points[k]) for k in np.argsort(np.nan_to_num(cost, nan=np.inf))]
 
 
 def _shapes(start: Trial, effect: str) -> Array:
@@ -168,7 +173,8 @@ def _shapes(start: Trial, effect: str) -> Array:
     for k in shaping:
         x, u = float(start.x[k]), members[k]
         others = [x - SHAPE_STEP, x + SHAPE_STEP] if u.logarithmic else []
-        levels.append([x, u.start, *(float(np.clip(v, u.low, u.high)) for v in others)])
+        others = [float(np.clip(v, u.low, u.high)) for v in others]
+        levels.append(list(dict.fromkeys([x, u.start, *others])))
     points = []
     for chosen in product(*levels):
         point = start.x.copy()

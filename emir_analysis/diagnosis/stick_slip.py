@@ -1,24 +1,26 @@
 """Machines that stick and slip: which friction it is, told by a beginning that grows.
 
 Over a long run each instant of sticking shifts the next, and the error is a rough function of all
-parameters: a fit ends close to where it began. Over a few seconds it is smooth, and from there on
-the fit is led along. How friction falls behind the break-away and rises with speed lies between
-two windows of the balances, so the fullest law is fitted, and what is not needed is left out.
+parameters: a fit ends close to where it began. Over a few seconds it is smooth with a handful of
+minima: there the fit is begun from many shapes of the friction, and the best is led along. How
+friction falls behind the break-away and rises with speed lies between two windows of the balances,
+so the fullest law is fitted, and what is not needed is left out.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shaped, trial
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, fit
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
+STARTS = 12  # shapes near standstill from which the first beginning is fitted
 GROWTH = 1.5  # of a beginning from one to the next
-DECIDED = 10.0  # s, of the beginning that chooses among starts and laws
+DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
 ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
@@ -64,14 +66,14 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
 def begun(start: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 
-    It begins where it is told to, and with those shapes of its effects that are best over the
-    first beginning; the better of both is returned.
+    Over the first beginning it is fitted from those shapes of the friction near standstill whose
+    free run is best there; the best of these fits is led on.
     """
-    fits = [
-        _led(start, evidence, _at_rest(each, evidence), FIRST, DECIDED)
-        for each in (start, shaped(start, evidence.until(FIRST)))
-    ]
-    return start.continued(min(fits, key=lambda solution: solution.misfit))
+    first = evidence.until(FIRST)
+    starts = shapes(start, STRIBECK, first)[:STARTS]
+    fits = [_fitted(each, first, _at_rest(each, evidence), ROUGH) for each in starts]
+    best = min(fits, key=lambda solution: solution.misfit)
+    return start.continued(_led(start, evidence, best.x, FIRST, DECIDED))
 
 
 def grown(known: Trial, evidence: Evidence) -> Trial:

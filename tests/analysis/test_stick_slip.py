@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from test_diagnosis_search import search
+from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
 from emir_analysis.diagnosis.stick_slip import DECIDED, begun, fullest, grown, nested
+from emir_plant.sheet import Sheet, joint1
 
 HIDDEN = {
     "effects.stribeck_friction.force": 2e4,
@@ -51,7 +52,7 @@ def test_no_more_friction_stays_than_there_is() -> None:
 
 def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:
     """One law is the other with a parameter fixed, and no third one."""
-    _, sheet, _ = search(SLIDING)
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
     coulomb, stribeck, viscous = (
         trial(sheet, (f"{name}_friction",)) for name in ("coulomb", "stribeck", "viscous")
     )

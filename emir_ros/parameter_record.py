@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -37,7 +39,8 @@ class ParameterRecord:
         self._looks = dict.fromkeys(nodes, PATIENCE)  # since each was asked
         self._answers: dict[str, dict[str, Any]] = {}
         self._found = found
-        self._timer = node.create_timer(PERIOD, self._look)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # /clock waits for the recorder
+        self._timer = node.create_timer(PERIOD, self._look, clock=steady)
         self._futures: list[Future] = []  # kept: nobody else holds them until they are done
 
     def _look(self) -> None:

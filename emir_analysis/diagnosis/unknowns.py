@@ -75,7 +75,7 @@ class Unknowns:
     @property
     def toleranced(self) -> NDArray[np.bool_]:
         """Which unknowns the maker states with a tolerance, (k,)."""
-        return np.array([unknown.toleranced for unknown in self.members])
+        return np.array([unknown.toleranced for unknown in self.members], dtype=np.bool_)
 
     def values(self, x: Array) -> dict[str, float]:
         """Return the parameters' values by dotted path, SI units."""

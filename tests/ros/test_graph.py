@@ -208,6 +208,14 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
+def test_nodes_that_live_in_the_lock_steps_time_do_not_wait_for_it(tmp_path: Path) -> None:
+    parameters, bag = tmp_path / "clock.yaml", tmp_path / "run"
+    parameters.write_text("/**: {ros__parameters: {use_sim_time: true}}")
+    words = ["--params", str(parameters), "--duration", str(DURATION), "--bag", str(bag)]
+    assert run_graph(words) == 0
+    _assert_equal(bag, "cascade")
+
+
 def test_readers_agree_and_metadata_is_rosbag2s(tmp_path: Path) -> None:
     from mcap_ros2.decoder import DecoderFactory
 

@@ -118,16 +118,8 @@ def _next(
         longer = min(growth * time, end)
         if _errors(known, evidence.until(longer), fitted.x[None])[0] < limit:
             return longer, fitted.x
-    drawn = _drawn(fitted, int(DRAWN / longer))
+    drawn = np.vstack([fitted.x, fitted.drawn(int(DRAWN / longer))])
     return longer, drawn[int(np.argmin(_errors(known, evidence.until(longer), drawn)))]
-
-
-def _drawn(fitted: Solution, count: int) -> Array:
-    """Return x of a fit and of others, (1 + count, k), drawn from its normal distribution."""
-    told = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
-    random = np.random.default_rng(0)  # the same every time
-    others = random.multivariate_normal(fitted.x, told, count, method="eigh")
-    return np.vstack([fitted.x, others])
 
 
 def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:

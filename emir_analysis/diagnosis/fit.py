@@ -48,6 +48,15 @@ class Solution:
     covariance: Array
     misfit: float
 
+    def drawn(self, count: int) -> Array:
+        """Return vectors, (count, k), drawn from the normal distribution; what is untold stays.
+
+        The same ones every time.
+        """
+        told = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        random = np.random.default_rng(0)
+        return random.multivariate_normal(self.x, told, count, method="eigh")
+
 
 def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     """Minimise the squared residuals of a problem inside its bounds.

@@ -20,6 +20,9 @@ from emir_plant.sheet import Sheet
 FIRST = 3.0  # s, of the first beginning
 STARTS = 12  # shapes near standstill from which the first beginning is fitted
 GROWTH = 1.5  # of a beginning from one to the next
+LEAP = 3.0  # the same where the free run follows the machine until then
+FOLLOWS = 1.05  # times the error so far: the most over a longer beginning that it follows
+DRAWN = 3000.0  # s, simulated of machines drawn from what a beginning leaves open
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
@@ -94,10 +97,36 @@ def _at_rest(known: Trial, evidence: Evidence) -> Array:
 
 def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
     """Fit to beginnings that grow from a time to another, s."""
+    fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY)
     while time < end:
-        x = _fitted(known, evidence.until(time), x, ON_THE_WAY).x
-        time *= GROWTH
-    return _fitted(known, evidence.until(end), x)
+        time, x = _next(known, evidence, fitted, time, end)
+        fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY if time < end else ACCURACY)
+    return fitted
+
+
+def _next(
+    known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float
+) -> tuple[float, Array]:
+    """Return the next beginning's end, s, and from where it is fitted.
+
+    As long as the instants of sticking are the machine's, a fit goes on from what it knows. Where
+    they are not, it would not find back to them: of machines drawn from what the beginning leaves
+    open one goes on whose instants are (a particle filter's step, Gordon et al. 1993).
+    """
+    limit = FOLLOWS * _errors(known, evidence.until(time), fitted.x[None])[0]
+    for growth in (LEAP, GROWTH):
+        longer = min(growth * time, end)
+        if _errors(known, evidence.until(longer), fitted.x[None])[0] < limit:
+            return longer, fitted.x
+    drawn = np.vstack([fitted.x, fitted.drawn(int(DRAWN / longer))])
+    return longer, drawn[int(np.argmin(_errors(known, evidence.until(longer), drawn)))]
+
+
+def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:
+    """Return the RMS errors, (m,), of free runs in units of the noise; inf for one that fails."""
+    problem = free_run_problem(known, evidence, points[0])
+    left = problem.model(np.clip(points, problem.low, problem.high))
+    return np.asarray(np.nan_to_num(np.sqrt(np.mean(np.square(left), axis=1)), nan=np.inf))
 
 
 def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:

@@ -56,3 +56,14 @@ def test_the_covariance_is_the_textbook_s() -> None:
     told = np.setdiff1d(np.arange(SIZE), UNTOLD)
     expected = np.linalg.inv(slopes[:, told].T @ slopes[:, told])
     assert solution.covariance[np.ix_(told, told)] == pytest.approx(expected, rel=1e-2, abs=1e-9)
+
+
+def test_vectors_drawn_from_a_fit_have_its_spread() -> None:
+    """Sample mean and deviation over 20 000, within what chance allows; the untold stay."""
+    untold = np.array([-3.0, 6.9])
+    solution, _, _ = fitted(0, untold, stated=False)
+    drawn, told = solution.drawn(20000), np.setdiff1d(np.arange(SIZE), UNTOLD)
+    assert np.abs(drawn[:, UNTOLD] - untold).max() < 1e-6
+    scaled = (drawn - solution.x)[:, told] / np.sqrt(np.diag(solution.covariance)[told])
+    assert np.all(np.abs(scaled.mean(axis=0)) < 5.0 / np.sqrt(20000))
+    assert scaled.std(axis=0) == pytest.approx(1.0, rel=0.03)

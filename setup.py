@@ -35,7 +35,7 @@ setup(
     entry_points={"console_scripts": ["emir = emir_analysis.cli:main"]},
     install_requires=[
         "matplotlib>=3.8",
-        "mcap>=1.5",
+        "mcap>=1.5,<1.7",  # mcap_writer.py reaches into its Writer
         "mcap-ros2-support>=0.5",
         "numba>=0.59",
         "numpy>=1.26",

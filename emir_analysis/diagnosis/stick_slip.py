@@ -13,7 +13,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import Solution, fit
+from emir_analysis.diagnosis.fit import Solution, descended
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -131,7 +131,7 @@ def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:
 
 def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:
     problem = free_run_problem(known, evidence, x)
-    return fit(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
+    return descended(replace(problem, step=SLOPE_STEP), accuracy)
 
 
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:

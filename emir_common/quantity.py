@@ -2,7 +2,10 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 
@@ -49,13 +52,20 @@ def quantity(
     )
 
 
-def quantities(group: Any) -> dict[str, Quantity]:
+def quantities(group: Any) -> Mapping[str, Quantity]:
     """Return the declared quantities of a parameter dataclass (class or instance) by name."""
-    return {
-        field.name: field.metadata["quantity"]
-        for field in dataclasses.fields(group)
-        if "quantity" in field.metadata
-    }
+    return _quantities(group if isinstance(group, type) else type(group))
+
+
+@cache
+def _quantities(kind: Any) -> Mapping[str, Quantity]:
+    return MappingProxyType(
+        {
+            field.name: field.metadata["quantity"]
+            for field in dataclasses.fields(kind)
+            if "quantity" in field.metadata
+        }
+    )
 
 
 def check_ranges(group: Any, prefix: str = "") -> None:

@@ -6,6 +6,7 @@ frame that turns with the boom.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,7 @@ def rigid_arm_joints(geometry: Geometry) -> Array:
     return join
 
 
+@lru_cache(maxsize=16)
 def boom_modes(geometry: Geometry) -> BoomModes:
     """Reduce the section model to its `modes_kept` lowest modes.
 

@@ -200,7 +200,7 @@ class Balances:
             experiment.commands[::stride],
             COMMAND_STEP * stride,
             np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
-            np.concatenate([plants[k].record for k in able]),
+            np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
         )
         return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
 

@@ -7,7 +7,7 @@ and from there on the free run.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
 
 import numpy as np
@@ -278,6 +278,7 @@ def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Ar
     return free_runs([machine], experiment, [start])[0, :, ANGLE + 1 :]
 
 
+@lru_cache(maxsize=16)  # several criteria ask for those of one machine
 def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
     """Return simulated minus measured in units of the noise, (n, outputs), for each recording."""
     found = []

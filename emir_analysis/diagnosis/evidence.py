@@ -1,6 +1,7 @@
 """All recordings of one machine together: their balances and free runs in one vector each."""
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -34,8 +35,15 @@ class Evidence:
         self.shown = shown
         self.told = available(self.measured)
         self.fitted = self.told & (np.arange(self.told.size) != LINKAGE)
-        self._balances = [Balances(experiment, stated) for experiment in self.experiments]
-        self.windows_of_first = self._balances[0].time.size
+
+    @cached_property
+    def _balances(self) -> list[Balances]:
+        return [Balances(experiment, self.stated) for experiment in self.experiments]
+
+    @property
+    def windows_of_first(self) -> int:
+        """Number of the balances' windows in the first recording."""
+        return self._balances[0].time.size
 
     def head(self, share: float) -> "Evidence":
         """Return the first part of every recording."""

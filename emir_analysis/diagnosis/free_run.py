@@ -40,7 +40,7 @@ def free_runs(
         experiment.commands[::stride],
         COMMAND_STEP * stride,
         experiment.every // stride,
-        np.concatenate([plants[k].record for k in able]),
+        np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
         COMMAND_STEP * stride,
     )
     for k, truth in zip(able, truths, strict=True):

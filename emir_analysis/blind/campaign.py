@@ -85,7 +85,7 @@ def read_log(log: Path, plan: Plan | None = None) -> list[Outcome]:
         log.write_text(whole, encoding="utf-8")
     lines = whole.splitlines()
     if lines and plan is not None and lines[0] != _header(plan):
-        raise InputError(f"{log}: of another seed, duration or set; choose another file")
+        raise InputError(f"{log}: of another seed, duration, set or kind; choose another file")
     known = {field.name for field in fields(Outcome)}
     try:
         found = [json.loads(line) for line in lines[1:]]

@@ -27,6 +27,9 @@ def arguments(words: list[str]) -> argparse.Namespace:
         "--foreign", type=Path, metavar="FILE", help="Python: effects that no catalogue holds"
     )
     parser.add_argument("--only", default="", metavar="NAME,NAME", help="draw from these effects")
+    parser.add_argument(
+        "--varied", action="store_true", help="each machine of another size, with other sensors"
+    )
     parser.add_argument("--duration", type=float, default=60.0, metavar="S", help="of a recording")
     parser.add_argument(
         "--log", type=Path, metavar="FILE", help="one JSON line per machine; continued if there"
@@ -37,7 +40,8 @@ def arguments(words: list[str]) -> argparse.Namespace:
 
 def command(options: argparse.Namespace, progress: Callable[[str], None]) -> str:
     """Run the blind test; return its report. Raises InputError for what cannot be used."""
-    plan = Plan(options.seed, options.duration, _source(options.foreign), _only(options.only))
+    source, only = _source(options.foreign), _only(options.only)
+    plan = Plan(options.seed, options.duration, source, only, options.varied)
     foreign_effects(plan.foreign)
     if options.machines < 1:
         raise InputError(f"--machines {options.machines}: at least one")

@@ -5,14 +5,16 @@ smoothed law, another smoothing stands here; where it has a lag, the same differ
 """
 
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 
 from emir_analysis.blind.machine import HYDRAULIC, Array, Machine, Sizes
-from emir_analysis.blind.numbers import Numbers
+from emir_analysis.blind.numbers import Numbers, main_joint
 
 Random = np.random.Generator
+Scale = Callable[[Numbers], float]
 
 ATMOSPHERE = 1e5  # Pa
 P_H, P_S, LOGIC = 0, 1, 4
@@ -28,19 +30,59 @@ def either_sign(random: Random, low: float, high: float) -> float:
     return float(random.choice([-1.0, 1.0])) * between(random, low, high)
 
 
+def lifting_force(n: Numbers) -> float:
+    """Return the lifting force of the pump's pressure, N."""
+    return n.area_lifting * n.p0
+
+
+def nominal_speed(n: Numbers) -> float:
+    """Return the piston's nominal speed, m/s."""
+    return n.flow_nominal / n.area_lifting
+
+
+def lever(n: Numbers) -> float:
+    """Return the lever to which the stroke is in proportion, m."""
+    return n.triangle_b
+
+
+def boom_mass(n: Numbers) -> float:
+    """Return the boom's mass, kg, to which loads are in proportion."""
+    return n.boom_mass
+
+
+def nominal_leak(n: Numbers) -> float:
+    """Return the nominal flow over the pump's pressure, m^3/(s Pa)."""
+    return n.flow_nominal / n.p0
+
+
+def nominal_hose(n: Numbers) -> float:
+    """Return the cylinder's volume over the pump's pressure, m^3/Pa."""
+    return n.area_lifting * n.triangle_b / n.p0
+
+
 class Hidden(Machine):
     """Base of what may be hidden.
 
-    name: as the catalogue has it. grows: sizes to which more of the effect belongs.
+    name: as the catalogue has it. grows: sizes to which more of the effect belongs. scales: what
+    sizes are in proportion to, from one machine to another.
     """
 
     name: ClassVar[str]
     grows: ClassVar[tuple[str, ...]]
+    scales: ClassVar[dict[str, Scale]] = {}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
-        """Return sizes by name, SI units."""
+        """Return sizes by name, SI units, as in EMIR's main joint."""
         raise NotImplementedError
+
+    @classmethod
+    def drawn(cls, random: Random, n: Numbers) -> Sizes:
+        """Return sizes by name, SI units, as in a machine with these numbers."""
+        sizes, emir = cls.draw(random), main_joint()
+        for name in sizes.keys() & cls.scales.keys():
+            sizes[name] *= cls.scales[name](n) / cls.scales[name](emir)
+        return sizes
 
     def size(self, name: str) -> float:
         """Return one of the effect's sizes; 0 where it was not drawn."""
@@ -57,6 +99,7 @@ class CoulombFriction(Hidden):
 
     name = "coulomb_friction"
     grows = ("coulomb_force",)
+    scales: ClassVar[dict[str, Scale]] = {"coulomb_force": lifting_force}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -77,6 +120,7 @@ class StribeckFriction(Hidden):
 
     name = "stribeck_friction"
     grows = ("stribeck_force",)
+    scales: ClassVar[dict[str, Scale]] = {"stribeck_force": lifting_force}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -101,6 +145,7 @@ class ViscousFriction(Hidden):
 
     name = "viscous_friction"
     grows = ("viscous",)
+    scales: ClassVar[dict[str, Scale]] = {"viscous": lambda n: lifting_force(n) / nominal_speed(n)}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -138,6 +183,7 @@ class Payload(Hidden):
 
     name = "payload"
     grows = ("mass",)
+    scales: ClassVar[dict[str, Scale]] = {"mass": boom_mass}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -155,6 +201,7 @@ class ExternalLoad(Hidden):
 
     name = "external_load"
     grows = ("load",)
+    scales: ClassVar[dict[str, Scale]] = {"load": boom_mass}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -183,6 +230,7 @@ class LinkageError(Hidden):
 
     name = "linkage_error"
     grows = ("arm_scale", "arm_slope")
+    scales: ClassVar[dict[str, Scale]] = {"arm_slope": lambda n: 1.0 / lever(n)}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -208,6 +256,7 @@ class InternalLeakage(Hidden):
 
     name = "internal_leakage"
     grows = ("past_piston",)
+    scales: ClassVar[dict[str, Scale]] = {"past_piston": nominal_leak}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -226,6 +275,10 @@ class ExternalLeakage(Hidden):
 
     name = "external_leakage"
     grows = ("leak_lifting", "leak_lowering")
+    scales: ClassVar[dict[str, Scale]] = {
+        "leak_lifting": nominal_leak,
+        "leak_lowering": nominal_leak,
+    }
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -265,6 +318,10 @@ class VesselCompliance(Hidden):
 
     name = "vessel_compliance"
     grows = ("hose_lifting", "hose_lowering")
+    scales: ClassVar[dict[str, Scale]] = {
+        "hose_lifting": nominal_hose,
+        "hose_lowering": nominal_hose,
+    }
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -285,6 +342,7 @@ class SupplyPressureDroop(Hidden):
 
     name = "supply_pressure_droop"
     grows = ("droop",)
+    scales: ClassVar[dict[str, Scale]] = {"droop": lambda n: 1.0 / nominal_leak(n)}
 
     def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
         super().__init__(numbers, sizes)
@@ -466,6 +524,7 @@ class Backlash(Hidden):
 
     name = "backlash"
     grows = ("gap",)
+    scales: ClassVar[dict[str, Scale]] = {"gap": lever, "seating": lifting_force}
 
     def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
         super().__init__(numbers, sizes)

@@ -1,11 +1,13 @@
 """The numbers of a machine: as its maker states them, and as one machine was built."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Self
 
 import numpy as np
+import yaml
 
 from emir_common.quantity import ParameterError
 from emir_common.yaml_file import read_map
@@ -56,6 +58,8 @@ class Numbers:
     pressure_noise: float
     deflection_noise: float
     payload: float = 0.0
+    rate: float = 100.0  # 1/s, of the sensors
+    command_period: float = 0.032  # s
 
     def with_factors(self, factors: dict[str, float]) -> Self:
         """Return the numbers with some of them multiplied."""
@@ -73,6 +77,29 @@ class Stated:
         """Return a machine somewhere within the tolerances."""
         factors = {n: 1.0 + tol * random.uniform(-1.0, 1.0) for n, tol in self.tolerances.items()}
         return self.numbers.with_factors(factors)
+
+
+def data_sheet(stated: Stated) -> str:
+    """Return a data sheet as the maker writes it, YAML in the form of DATA_SHEET."""
+    groups = read_map(DATA_SHEET, what="parameters")
+    for group in groups.values():
+        for name, entry in group.items():
+            entry["value"] = getattr(stated.numbers, name)
+            if name in stated.tolerances:
+                entry["tol"] = stated.tolerances[name]
+    return str(yaml.safe_dump(groups, sort_keys=False))
+
+
+def signal_map(missing: tuple[str, ...]) -> str:
+    """Return the signal map, YAML, without the sensors that are missing."""
+    signals = read_map(SIGNAL_MAP, what="signals")
+    return str(yaml.safe_dump({n: s for n, s in signals.items() if n not in missing}))
+
+
+@cache
+def main_joint() -> Numbers:
+    """Return the numbers of EMIR's main joint, which `DATA_SHEET` states."""
+    return read_numbers(DATA_SHEET).numbers
 
 
 def read_numbers(file: Path) -> Stated:

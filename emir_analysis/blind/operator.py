@@ -10,7 +10,6 @@ RANGE = (0.25, 1.30)  # rad, in which the targets lie
 REST = 1.0  # s, before the first move
 PAUSES = 0.5  # share of moves after which the machine rests
 LONGEST = 6.0  # s, of one move
-PERIOD = 0.032  # s, between commands
 LEAST = 2e-3  # of the nominal speed, for which the valve is opened
 
 
@@ -37,7 +36,7 @@ class Operator:
         if self._speed == 0.0:
             return 0.0
         speed = self._speed * self._envelope(time)
-        self._reference += speed * PERIOD
+        self._reference += speed * n.command_period
         nominal = n.flow_nominal / n.area_lifting
         wanted = (speed + self._feedback * (self._reference - shown)) / nominal
         if wanted < 0.0:

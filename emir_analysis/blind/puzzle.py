@@ -124,7 +124,7 @@ def _that_matters(
 def _large_enough(
     effect: type[Hidden], numbers: Numbers, start: Start, stated: Stated, random: Random
 ) -> tuple[Sizes | None, float]:
-    sizes = effect.draw(random)
+    sizes = effect.drawn(random, stated.numbers)
     seed = int(random.integers(2**31))
     for _ in range(ATTEMPTS):
         operator = _operator(np.random.default_rng(seed), stated, abrupt=True)

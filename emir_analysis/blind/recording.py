@@ -13,7 +13,6 @@ from emir_analysis.blind.operator import RANGE, Operator
 
 Command = Callable[[float, Array], float]  # time, s, and state -> y2
 
-COMMAND_PERIOD, SAMPLE_PERIOD = 0.032, 0.01  # s
 START = 1_700_000_000_000_000_000  # ns
 _HEADER = """\
 std_msgs/Header header
@@ -35,7 +34,7 @@ _PRESSURE = "float64 fluid_pressure\nfloat64 variance"
 class Run:
     """What was commanded and what the sensors show of it, without noise and quantisation.
 
-    commands: (k,) every COMMAND_PERIOD. shown: (n,) of each sensor, every SAMPLE_PERIOD.
+    commands: (k,) one every command period. shown: (n,) of each sensor, one every sample.
     """
 
     commands: Array
@@ -65,22 +64,22 @@ def repeated(machine: Machine, start: Start, commands: Array) -> Run:
     return _run(
         machine,
         start,
-        lambda time, _: float(commands[round(time / COMMAND_PERIOD)]),
-        commands.size * COMMAND_PERIOD,
+        lambda time, _: float(commands[round(time / machine.n.command_period)]),
+        commands.size * machine.n.command_period,
     )
 
 
 def _run(machine: Machine, start: Start, command: Command, duration: float) -> Run:
-    count = round(duration / COMMAND_PERIOD)
-    samples = np.arange(int(count * COMMAND_PERIOD / SAMPLE_PERIOD)) * SAMPLE_PERIOD
+    held, sample = machine.n.command_period, 1.0 / machine.n.rate
+    count = round(duration / held)
+    samples = np.arange(int(count * held / sample)) * sample
     late = machine.delay()
     x = machine.start(start.angle, start.p_s)
     commands = np.zeros(count)
     states = np.empty((samples.size, x.size))
     for k in range(count):
-        begin, end = k * COMMAND_PERIOD, (k + 1) * COMMAND_PERIOD
-        commands[k] = command(begin, x)
-        for a, b, acting in _pieces(commands, k, begin, end, late):
+        commands[k] = command(k * held, x)
+        for a, b, acting in _pieces(commands, k, held, late):
             inside = (samples >= a - 1e-9) & (samples < b - 1e-9)
             times = np.unique(np.concatenate([[a], np.maximum(samples[inside], a), [b]]))
             found = machine.run(x, times, acting)
@@ -90,12 +89,12 @@ def _run(machine: Machine, start: Start, command: Command, duration: float) -> R
 
 
 def _pieces(
-    commands: Array, k: int, begin: float, end: float, late: float
+    commands: Array, k: int, held: float, late: float
 ) -> Iterator[tuple[float, float, float]]:
     """Yield the parts of a command period over which the command at the valve stays the same."""
-    steps = late / COMMAND_PERIOD
-    whole = int(steps)
-    change = begin + late - whole * COMMAND_PERIOD
+    begin, end = k * held, (k + 1) * held
+    whole = int(late / held)
+    change = begin + late - whole * held
     older = commands[k - whole - 1] if k > whole else 0.0
     newer = commands[k - whole] if k >= whole else 0.0
     if change > begin + 1e-9:
@@ -113,17 +112,17 @@ def write(path: Path, run: Run, machine: Machine, random: np.random.Generator) -
     """Write a run as its sensors measure it, to one .mcap file."""
     n = machine.n
     size = run.shown["angle"].size
-    step = n.resolver_span / 2**n.resolver_bits
+    sample, step = 1.0 / n.rate, n.resolver_span / 2**n.resolver_bits
     angle = np.round(run.shown["angle"] / step) * step
     pressure_noise = n.pressure_noise * random.standard_normal((2, size))
     gauge_noise = n.deflection_noise * random.standard_normal(size)
     topics = {
-        "/joint_states": (SAMPLE_PERIOD, angle),
-        "/cylinder": (SAMPLE_PERIOD, machine.stated_stroke(angle)),
-        "/pressure_lifting": (SAMPLE_PERIOD, run.shown["pressure_lifting"] + pressure_noise[0]),
-        "/pressure_lowering": (SAMPLE_PERIOD, run.shown["pressure_lowering"] + pressure_noise[1]),
-        "/boom_deflection": (SAMPLE_PERIOD, run.shown["deflection"] + gauge_noise),
-        "/valve_command": (COMMAND_PERIOD, run.commands),
+        "/joint_states": (sample, angle),
+        "/cylinder": (sample, machine.stated_stroke(angle)),
+        "/pressure_lifting": (sample, run.shown["pressure_lifting"] + pressure_noise[0]),
+        "/pressure_lowering": (sample, run.shown["pressure_lowering"] + pressure_noise[1]),
+        "/boom_deflection": (sample, run.shown["deflection"] + gauge_noise),
+        "/valve_command": (n.command_period, run.commands),
     }
     with path.open("wb") as stream, Writer(stream) as writer:
         joint = writer.register_msgdef("sensor_msgs/msg/JointState", _HEADER.format(fields=_JOINT))

@@ -15,12 +15,20 @@ import numpy as np
 
 from emir_analysis.blind.hidden import Hidden
 from emir_analysis.blind.machine import NotSolvedError
-from emir_analysis.blind.numbers import DATA_SHEET, SIGNAL_MAP, read_numbers
+from emir_analysis.blind.numbers import (
+    DATA_SHEET,
+    Stated,
+    data_sheet,
+    read_numbers,
+    signal_map,
+)
 from emir_analysis.blind.puzzle import Puzzle, kind_of, puzzle
 from emir_analysis.blind.recording import write
+from emir_analysis.blind.varied import missing_sensors, varied
 from emir_analysis.errors import InputError
 
 PATIENCE = 3600.0  # s, for one diagnosis
+SHEET, SIGNALS = "datasheet.yaml", "signals.yaml"  # beside a machine's recordings
 
 
 @dataclass(frozen=True)
@@ -29,12 +37,14 @@ class Plan:
 
     foreign: the source text of a module whose FOREIGN lists what no catalogue holds. duration:
     of each of a machine's two recordings, s. only: effects from which to draw; all when empty.
+    varied: each machine is of a sheet of its own, with its own sampling and sensors.
     """
 
     seed: int
     duration: float
     foreign: str = ""
     only: tuple[str, ...] = ()
+    varied: bool = False
 
 
 @dataclass(frozen=True)
@@ -88,7 +98,10 @@ def trial(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Ou
 
 
 def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
-    stated, foreign = read_numbers(DATA_SHEET), foreign_effects(plan.foreign)
+    foreign = foreign_effects(plan.foreign)
+    stated, missing = _machine(plan, number)
+    (folder / SHEET).write_text(data_sheet(stated), encoding="utf-8")
+    (folder / SIGNALS).write_text(signal_map(missing), encoding="utf-8")
     try:
         made = puzzle(stated, plan.seed, number, foreign, plan.duration, plan.only)
     except NotSolvedError as error:
@@ -101,13 +114,22 @@ def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
     return _outcome(made, number, answer, failure, time.monotonic() - begin)
 
 
+def _machine(plan: Plan, number: int) -> tuple[Stated, tuple[str, ...]]:
+    """Return what the maker says of a machine and which sensors it does without."""
+    stated = read_numbers(DATA_SHEET)
+    if not plan.varied:
+        return stated, ()
+    random = np.random.default_rng((plan.seed, number, 2))
+    return varied(stated, random), missing_sensors(random)
+
+
 def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:
     """Return the answer of `emir diagnose`, or why there is none."""
     answer = folder / "answer.json"
     result = subprocess.run(  # noqa: S603 (the project's own command)
         [
             *(sys.executable, "-m", "emir_analysis.cli", "diagnose", str(folder / "a.mcap")),
-            *("--datasheet", str(DATA_SHEET), "--signals", str(SIGNAL_MAP)),
+            *("--datasheet", str(folder / SHEET), "--signals", str(folder / SIGNALS)),
             *("--judge", str(folder / "b.mcap"), "--json", str(answer)),
         ],
         capture_output=True,

@@ -5,7 +5,6 @@ found once, they are eliminated (variable projection, Golub and Pereyra 1973), a
 only its own few fields remain to be fitted: cheap enough for every effect of the registry.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
@@ -13,9 +12,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
+from emir_analysis.diagnosis.loads import FOR_EVER, Load, likely, of_force, of_steps
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -26,9 +27,9 @@ STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit sta
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
-FASTEST_SWING = 0.5  # Hz: faster ones average out over the windows of the force balance
-FREQUENCIES = 4  # of a swinging load that are tried in a bandwidth of 1 / duration
-FEWEST = 8  # windows over which a load has to swing
+FORCE = list(BALANCES).index("force")
+LOAD = "external_load"
+LOAD_STEP = 0.25  # s: between begins of a load that are tried; a third of it shifts the slow mode
 
 Missing = Callable[[list[Trial]], Array]
 
@@ -144,7 +145,7 @@ def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list
     An effect that cannot be simulated, or that does not stay on, is not in the list.
     """
     left = _Left(known, _in_balances(evidence, floor), STEP)
-    return _fitted(_begun(known, sheet, evidence, left))
+    return _fitted(_begun(known, sheet, _by_balance(known, evidence), left))
 
 
 def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
@@ -154,7 +155,7 @@ def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -
     """
     left = _Left(known, _in_balances(evidence, floor), STEP)
     nothing = left([known])[0]
-    begun = _begun(known, sheet, evidence, left)
+    begun = _begun(known, sheet, _by_balance(known, evidence), left)
     pairs = sorted(combinations(begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing))
     together = []
     for one, other in pairs[:MOST_FITTED]:
@@ -175,7 +176,9 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
         return coarse_errors([t.machine for t in trials], evidence, starts)
 
     left = _Left(known, missing, SLOPE_STEP)
-    begun = _begun(known, sheet, evidence, left, SMALL)
+    told = evidence.told[FORCE]
+    loads = _by_balance(known, evidence) if told else _by_free_run(known, sheet, evidence, left)
+    begun = _begun(known, sheet, loads, left, SMALL)
     return sorted((c.stepped(missing) for c in begun), key=lambda s: s.cost)
 
 
@@ -187,17 +190,36 @@ def _in_balances(evidence: Evidence, floor: Array) -> Missing:
     return missing
 
 
+def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
+    """Return loads at the TCP by the force missing in the first recording."""
+    force = evidence.residuals([known.machine])[0][: evidence.windows_of_first, FORCE]
+    geometry = evidence.stated.geometry
+    at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
+    return likely(of_force(evidence.time[: force.size], np.nan_to_num(at_tip * force)))
+
+
+def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) -> list[Load]:
+    """Return loads at the TCP by what they would change in the free run."""
+    loaded = trial(sheet, (*known.effects, LOAD), known)
+    members = loaded.unknowns.members[known.x.size :]
+    size = SMALL * REGISTRY[LOAD].trial["force"]
+    begin = np.arange(0.0, float(evidence.experiments[0].time[-1]), LOAD_STEP)
+    steps = [_fields(members, Load(size, 0.0, 0.0, float(t), FOR_EVER)) for t in begin]
+    nothing = left([known])[0]
+    changed = left([loaded.at(np.append(known.x, own)) for own in steps]) - nothing
+    return likely(of_steps(begin, np.nan_to_num(changed / size), -np.nan_to_num(nothing)))
+
+
 def _begun(
-    known: Trial, sheet: Sheet, evidence: Evidence, left: _Left, size: float = 1.0
+    known: Trial, sheet: Sheet, loads: list[Load], left: _Left, size: float = 1.0
 ) -> list[_Candidate]:
     """Begin each further effect; size: of its starts, in those on the balances."""
-    force = evidence.residuals([known.machine])[0][: evidence.windows_of_first, 0]
     found = []
     for name in REGISTRY:
         if name not in known.effects:
             start = trial(sheet, (*known.effects, name), known)
             members = start.unknowns.members[known.x.size :]
-            starts = _starts(name, members, force, evidence, size)
+            starts = _starts(name, members, loads, size)
             found.append(_Candidate(start, known.x.size, starts, left))
     return found
 
@@ -228,83 +250,25 @@ def _least(residual: Array, slopes: Array, low: Array, high: Array) -> tuple[Arr
 
 
 def _starts(
-    effect: str, members: tuple[Unknown, ...], force: Array, evidence: Evidence, size: float
+    effect: str, members: tuple[Unknown, ...], loads: list[Load], size: float
 ) -> list[Array]:
     """Return vectors, (k,), of the effect's fields from which a fit may start.
 
     Of several sizes all together, and each alone: together one may hide what another explains.
-    force: missing in the first recording, (w,) N. size: of the effect, in trial sizes.
+    loads: at the TCP, that explain much. size: of the effect, in trial sizes.
     """
     x = np.array([unknown.start for unknown in members])
-    if effect == "external_load":
-        return [x, *_loads_over_time(members, force, evidence)]
+    if effect == LOAD:
+        return [x, *(_fields(members, load) for load in loads)]
     sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
     allowed = [s for s in STARTS if s > 0.0 or any(u.low < 0.0 for u in members)]
     switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
     return [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
 
 
-def _loads_over_time(members: tuple[Unknown, ...], force: Array, evidence: Evidence) -> list[Array]:
-    """Return starts for a load that depends on time, from the force missing on the piston, N.
-
-    A swinging load from the start on, one that sets in later, and the stretch of time over which
-    the force is most unlike the rest.
-    """
-    time = evidence.time[: force.size]
-    geometry = evidence.stated.geometry
-    at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
-    loads = [(*swing, 1e6) for swing in swings(time, force)]
-    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-    first, last = np.triu_indices(total.size, 4)
-    unlike = (total[last] - total[first]) ** 2 / (last - first)
-    best = int(np.argmax(unlike))
-    i, j = int(first[best]), int(last[best]) - 1
-    outside = np.delete(force, np.arange(i, j + 1))
-    size = force[i : j + 1].mean() - (outside.mean() if outside.size else 0.0)
-    loads.append((size, 0.0, 0.0, float(time[i]), float(time[j] - time[i])))
-    return [
-        np.array(
-            [
-                (v - u.origin) / u.scale if not u.logarithmic else np.log(v / u.origin)
-                for u, v in zip(members, (size * at_tip, *others), strict=True)
-            ]
-        )
-        for size, *others in loads
-    ]
-
-
-def swings(time: Array, force: Array) -> list[tuple[float, float, float, float]]:
-    """Return force, N, frequency, Hz, phase, rad, and begin, s, of a harmonic beside a constant.
-
-    By least squares over a grid of frequencies and begins: the best from the start on, the best
-    that sets in later.
-    """
-    found = []
-    length = float(time[-1] - time[0])
-    for f in np.arange(1, int(FASTEST_SWING * FREQUENCIES * length)) / (FREQUENCIES * length):
-        wave = np.exp(2j * np.pi * f * time)
-        columns = np.stack([wave.real, wave.imag])
-        # sums from each begin to the end: the normal equations of all begins at once
-        after = np.cumsum(np.stack([*columns, *(columns * force)])[:, ::-1], axis=1)[:, ::-1]
-        squares = np.stack([columns[0] ** 2, columns[0] * columns[1], columns[1] ** 2])
-        squares = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1]
-        begins = np.arange(time.size - FEWEST)
-        normal = np.empty((begins.size, 3, 3))
-        normal[:, 0, 0] = time.size
-        normal[:, 0, 1:] = normal[:, 1:, 0] = after[:2, begins].T
-        normal[:, 1, 1], normal[:, 2, 2] = squares[0, begins], squares[2, begins]
-        normal[:, 1, 2] = normal[:, 2, 1] = squares[1, begins]
-        right = np.column_stack([np.full(begins.size, force.sum()), after[2:, begins].T])
-        solved = np.linalg.solve(normal + 1e-9 * time.size * np.eye(3), right[:, :, None])[:, :, 0]
-        gained = np.sum(solved * right, axis=1)
-        for k in (0, 1 + int(np.argmax(gained[1:]))):
-            _, a, b = solved[k]
-            begin = float(time[k]) if k else 0.0
-            phase = math.remainder(math.atan2(-b, a) + 2.0 * math.pi * f * begin, 2.0 * math.pi)
-            found.append((float(gained[k]), k > 0, (math.hypot(a, b), float(f), phase, begin)))
-    return [
-        max((g, swing) for g, late, swing in found if late is kind)[1] for kind in (False, True)
-    ]
+def _fields(members: tuple[Unknown, ...], load: Load) -> Array:
+    """Return a load as the vector, (5,), of its effect's fields."""
+    return np.array([unknown.at(value) for unknown, value in zip(members, load, strict=True)])
 
 
 def _soft(residual: Array) -> float:

@@ -12,7 +12,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.screening import screen, swings
+from emir_analysis.diagnosis.screening import screen
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -21,29 +21,6 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
-
-
-def swinging(size: float, frequency: float, phase: float, begin: float) -> Array:
-    """Return a load that swings from its begin on."""
-    wave = np.cos(2.0 * math.pi * frequency * (TIME - begin) + phase)
-    return np.where(begin <= TIME, size * wave, 0.0)
-
-
-def test_a_load_that_starts_to_swing_is_seen_beside_a_constant_and_noise() -> None:
-    noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
-    _, late = swings(TIME, swinging(20e3, 0.21, -1.2, 12.0) + 30e3 + noise)
-    size, frequency, phase, begin = late
-    assert size == pytest.approx(20e3, rel=0.05)
-    assert frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
-    assert begin == pytest.approx(12.0, abs=0.5)
-    off = 2.0 * math.pi * frequency * (12.0 - begin) + phase + 1.2
-    assert abs(math.remainder(off, 2.0 * math.pi)) < 0.3
-
-
-def test_a_load_that_swings_all_the_time_is_seen() -> None:
-    always, _ = swings(TIME, swinging(20e3, 0.21, -1.2, 0.0))
-    assert always[1] == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
-    assert always[3] == 0.0
 
 
 @pytest.mark.parametrize("effect", REGISTRY)

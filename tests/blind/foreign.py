@@ -4,10 +4,20 @@ Each is a subclass of `Hidden` with sizes at random; `FOREIGN` lists them.
 """
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
-from emir_analysis.blind.hidden import Hidden, Random, between
+from emir_analysis.blind.hidden import (
+    Hidden,
+    Random,
+    Scale,
+    between,
+    lever,
+    lifting_force,
+    nominal_leak,
+    nominal_speed,
+)
 from emir_analysis.blind.machine import Array, Sizes
 
 
@@ -16,6 +26,11 @@ class TightSpot(Hidden):
 
     name = "tight_spot"
     grows = ("tight_force",)
+    scales: ClassVar[dict[str, Scale]] = {
+        "tight_force": lifting_force,
+        "tight_place": lever,
+        "tight_width": lever,
+    }
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -37,6 +52,7 @@ class GasSpring(Hidden):
 
     name = "gas_spring"
     grows = ("spring_force",)
+    scales: ClassVar[dict[str, Scale]] = {"spring_force": lifting_force, "spring_length": lever}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -56,6 +72,9 @@ class OneWayDrag(Hidden):
 
     name = "one_way_drag"
     grows = ("drag",)
+    scales: ClassVar[dict[str, Scale]] = {
+        "drag": lambda n: lifting_force(n) / nominal_speed(n) ** 2
+    }
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -103,6 +122,7 @@ class EndCushion(Hidden):
 
     name = "end_cushion"
     grows = ("cushion",)
+    scales: ClassVar[dict[str, Scale]] = {"cushion_from": lever}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
@@ -119,6 +139,10 @@ class EarlyRelief(Hidden):
 
     name = "early_relief"
     grows = ("relief_slope",)
+    scales: ClassVar[dict[str, Scale]] = {
+        "relief_from": lambda n: n.p0,
+        "relief_slope": nominal_leak,
+    }
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:

@@ -11,13 +11,22 @@ from emir_analysis.blind import campaign as campaigns
 from emir_analysis.blind import puzzle as puzzles
 from emir_analysis.blind.campaign import campaign, workers
 from emir_analysis.blind.hidden import CATALOGUE
-from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
+from emir_analysis.blind.numbers import (
+    DATA_SHEET,
+    SIGNAL_MAP,
+    data_sheet,
+    read_numbers,
+    signal_map,
+)
 from emir_analysis.blind.puzzle import KINDS, MATTERS, hidden_in, puzzle
 from emir_analysis.blind.report import report
 from emir_analysis.blind.trial import Outcome, Plan, foreign_effects
+from emir_analysis.blind.varied import varied
 from emir_analysis.cli import main
 from emir_analysis.errors import InputError
+from emir_analysis.signals import read_signal_map
 from emir_plant.effects import REGISTRY
+from emir_plant.sheet import load_sheet
 
 FOREIGN = (Path(__file__).parent / "foreign.py").read_text()
 
@@ -69,6 +78,43 @@ def test_a_seed_gives_the_same_machine_and_its_effect_matters(
     for name, tolerance in stated.tolerances.items():
         factor = getattr(one.machine.n, name) / getattr(stated.numbers, name)
         assert abs(factor - 1.0) <= tolerance
+
+
+def test_a_varied_machine_is_another_one_that_works_as_well(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It rests and moves with pressures between tank and pump, and its sheet can be read."""
+    monkeypatch.setattr(puzzles, "PROBE", 4.0)
+    for seed in range(8):
+        stated = varied(read_numbers(DATA_SHEET), np.random.default_rng(seed))
+        n = stated.numbers
+        assert 0.4 * 22.5 <= n.boom_length <= 1.3 * 22.5
+        made = puzzle(stated, seed, 1, (), 6.0)
+        shown = made.learn.shown
+        assert shown["angle"].size == round(6.0 / n.command_period) * n.command_period * n.rate // 1
+        assert np.ptp(shown["angle"]) > 0.01
+        for name in ("pressure_lifting", "pressure_lowering"):
+            assert shown[name].min() > -1e5
+            assert shown[name].max() < 1.5 * n.p0
+        (tmp_path / "sheet.yaml").write_text(data_sheet(stated))
+        sheet = load_sheet(tmp_path / "sheet.yaml", strict=True)
+        assert sheet.machine.geometry.boom_length == n.boom_length
+        assert sheet.tolerances["cylinder.beta"] == stated.tolerances["beta"]
+
+
+def test_a_smaller_machine_has_a_smaller_load_hidden_in_it() -> None:
+    payload = next(effect for effect in CATALOGUE if effect.name == "payload")
+    emir = read_numbers(DATA_SHEET).numbers
+    half = emir.with_factors({"boom_mass": 0.5})
+    as_is, smaller = (payload.drawn(np.random.default_rng(3), n)["mass"] for n in (emir, half))
+    assert as_is == payload.draw(np.random.default_rng(3))["mass"]
+    assert smaller == 0.5 * as_is
+
+
+def test_a_signal_map_leaves_out_the_sensors_that_are_missing(tmp_path: Path) -> None:
+    (tmp_path / "signals.yaml").write_text(signal_map(("pressure_lowering",)))
+    left = read_signal_map(tmp_path / "signals.yaml")
+    assert left.keys() == read_signal_map(SIGNAL_MAP).keys() - {"pressure_lowering"}
 
 
 def test_an_interrupted_test_goes_on_where_it_was(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from emir_analysis.blind import hidden
 from emir_analysis.blind.boom import boom
 from emir_analysis.blind.machine import Machine
 from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
-from emir_analysis.blind.recording import COMMAND_PERIOD, Run, Start, repeated
+from emir_analysis.blind.recording import Run, Start, repeated
 from emir_common.parameter_tree import with_values
 from emir_plant.boom import boom_modes
 from emir_plant.plant import Plant
@@ -34,7 +34,7 @@ SIGNALS = {  # a tenth of the sensor noise, or of the resolver's step as RMS
 
 def moves(seconds: float) -> hidden.Array:
     """Return up, rest, down hard, so that the logic block shuts: commands every 32 ms."""
-    time = np.arange(0.0, seconds, COMMAND_PERIOD)
+    time = np.arange(0.0, seconds, STATED.command_period)
     command = np.where(time < 0.3, 0.0, 0.55)
     command[time > 0.3 * seconds] = 0.0
     command[time > 0.4 * seconds] = -0.9

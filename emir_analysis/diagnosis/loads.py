@@ -1,0 +1,123 @@
+"""A load over time: which swing and which stretch of time explain what is missing.
+
+What the loads of single windows change, in whatever is looked at (the force balance or the free
+run), adds up to what any load changes. So with the inner products of these changes, found once,
+loads of all frequencies, begins and durations are compared by least squares.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from emir_analysis.signals import Array
+
+FASTEST = 0.5  # Hz: faster swings average out over the windows of the force balance
+FREQUENCIES = 4  # that are tried in a bandwidth of 1 / duration
+FEWEST = 8  # windows over which a load has to swing
+SHORTEST = 4  # windows over which a load has to last
+FOR_EVER = 1e6  # s
+WEAK = 1e-9  # relative to what the strongest window's load changes: less is as good as nothing
+
+
+class Load(NamedTuple):
+    """F cos(2 pi f (t - begin) + phase): N, Hz, rad, s, s."""
+
+    force: float
+    frequency: float
+    phase: float
+    begin: float
+    duration: float
+
+
+class Response(NamedTuple):
+    """What loads of 1 N change and how much of it is missing.
+
+    begin: (w,) s, of windows of equal length. gram: (w, w) 1/N^2, inner products of what a load
+    in each window changes. right: (w,) 1/N, of what it changes with what is missing.
+    """
+
+    begin: Array
+    gram: Array
+    right: Array
+
+
+def of_force(time: Array, force: Array) -> Response:
+    """Return the response of a force, (w,) N, missing at equally spaced times, (w,) s.
+
+    A constant force is none that depends on time.
+    """
+    centred = np.eye(force.size) - 1.0 / force.size
+    return Response(time - 0.5 * (time[1] - time[0]), centred, centred @ force)
+
+
+def of_steps(begin: Array, changed: Array, missing: Array) -> Response:
+    """Return the response of a system to loads that stay, begun at times (w,) s.
+
+    changed: (w, n) by a load of 1 N each, missing: (n,) what loads ought to change.
+    """
+    windows = changed - np.vstack([changed[1:], np.zeros(missing.size)])
+    return Response(begin, windows @ windows.T, windows @ missing)
+
+
+def likely(response: Response) -> list[Load]:
+    """Return the best swing from the start on and later, the best gust and load that stays."""
+    return [*swings(response), *steady(response)]
+
+
+def steady(response: Response) -> tuple[Load, Load]:
+    """Return the constant load that ends and the one that sets in and stays that explain most."""
+    begin, gram, right = response
+    corner = np.zeros((begin.size + 1, begin.size + 1))
+    corner[1:, 1:] = np.cumsum(np.cumsum(gram, axis=0), axis=1)
+    total = np.concatenate([[0.0], np.cumsum(right)])
+    first, last = np.triu_indices(total.size, SHORTEST)
+    square = corner[last, last] + corner[first, first] - 2.0 * corner[first, last]
+    square = np.maximum(square, WEAK * gram.max())
+    along = total[last] - total[first]
+    found = []
+    for stays in (False, True):
+        gained = np.where((last == begin.size) == stays, along**2 / square, -1.0)
+        best = int(np.argmax(gained))
+        i, j = int(first[best]), int(last[best])
+        duration = FOR_EVER if stays else float(begin[j] - begin[i])
+        force = float(along[best] / square[best])
+        found.append(Load(force, 0.0, 0.0, float(begin[i]), duration))
+    return found[0], found[1]
+
+
+def swings(response: Response) -> tuple[Load, Load]:
+    """Return the swinging load from the start on and the one setting in later that explain most."""
+    begin, gram, right = response
+    window = float(begin[1] - begin[0])
+    length = window * begin.size
+    always, later = [], []
+    for f in np.arange(1, int(FASTEST * FREQUENCIES * length)) / (FREQUENCIES * length):
+        wave = np.exp(2j * np.pi * f * (begin + 0.5 * window))
+        columns = np.stack([wave.real, wave.imag])
+        # sums from each begin to the end: the normal equations of all begins at once
+        along = _to_the_end(columns * right)[:, :-FEWEST]
+        normal = np.empty((along.shape[1], 2, 2))
+        for row, one in enumerate(columns):
+            for column, other in enumerate(columns):
+                both = _to_the_end(_to_the_end(np.outer(one, other) * gram).T)
+                normal[:, row, column] = np.diagonal(both)[:-FEWEST]
+        normal += WEAK * gram.max() * np.eye(2)
+        solved = np.linalg.solve(normal, along.T[:, :, None])[:, :, 0]
+        gained = np.sum(solved * along.T, axis=1)
+        late = 1 + int(np.argmax(gained[1:]))
+        always.append((gained[0], _swing(f, solved[0], 0.0)))
+        later.append((gained[late], _swing(f, solved[late], float(begin[late]))))
+    return max(always)[1], max(later)[1]
+
+
+def _swing(frequency: float, parts: Array, begin: float) -> Load:
+    """Return a swing from the parts of it, (2,) N, that go as cosine and sine of time."""
+    a, b = parts
+    phase = math.remainder(math.atan2(-b, a) + 2.0 * math.pi * frequency * begin, 2.0 * math.pi)
+    return Load(math.hypot(a, b), float(frequency), phase, begin, FOR_EVER)
+
+
+def _to_the_end(values: Array) -> Array:
+    """Return the sums of rows, (..., w), from each place to the end."""
+    return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1]

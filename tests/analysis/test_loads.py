@@ -1,0 +1,83 @@
+"""Loads over time are found from what they change: a force itself, or a system that swings."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lsim, lti
+
+from emir_analysis.diagnosis.loads import FOR_EVER, of_force, of_steps, steady, swings
+from emir_analysis.signals import Array
+
+TIME = np.arange(0.5, 59.5, 0.25)  # s
+OSCILLATOR = lti([1.0], [1.0, 2.0 * 0.02 * 4.4, 4.4**2])  # 0.7 Hz, hardly damped, as the boom
+SAMPLES = np.arange(0.0, 40.0, 0.02)  # s
+
+
+def swinging(size: float, frequency: float, phase: float, begin: float) -> Array:
+    """Return a load that swings from its begin on."""
+    wave = np.cos(2.0 * math.pi * frequency * (TIME - begin) + phase)
+    return np.where(begin <= TIME, size * wave, 0.0)
+
+
+def test_a_load_that_starts_to_swing_is_seen_beside_a_constant_and_noise() -> None:
+    noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
+    _, late = swings(of_force(TIME, swinging(20e3, 0.21, -1.2, 12.0) + 30e3 + noise))
+    size, frequency, phase, begin, _ = late
+    assert size == pytest.approx(20e3, rel=0.05)
+    assert frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert begin == pytest.approx(12.0, abs=0.5)
+    off = 2.0 * math.pi * frequency * (12.0 - begin) + phase + 1.2
+    assert abs(math.remainder(off, 2.0 * math.pi)) < 0.3
+
+
+def test_a_load_that_swings_all_the_time_is_seen() -> None:
+    always, _ = swings(of_force(TIME, swinging(20e3, 0.21, -1.2, 0.0)))
+    assert always[1] == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert always[3] == 0.0
+
+
+def gust(size: float, begin: float, end: float, time: Array) -> Array:
+    """Return a load that is constant for a while."""
+    return np.where((begin <= time) & (time < end), size, 0.0)
+
+
+def test_a_gust_is_seen_beside_a_constant_and_noise() -> None:
+    noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
+    found, _ = steady(of_force(TIME, gust(-3e3, 11.8, 25.6, TIME) + 30e3 + noise))
+    assert found.force == pytest.approx(-3e3, rel=0.1)
+    assert found.begin == pytest.approx(11.8, abs=0.25)
+    assert found.begin + found.duration == pytest.approx(25.6, abs=0.25)
+
+
+def test_a_load_that_stays_lasts_for_ever() -> None:
+    _, found = steady(of_force(TIME, gust(3e3, 31.0, 1e3, TIME)))
+    assert found.begin == pytest.approx(31.0, abs=0.25)
+    assert found.duration == FOR_EVER
+
+
+def moved(load: Array) -> Array:
+    """Return how the oscillator moves under a load, by scipy."""
+    return np.asarray(lsim(OSCILLATOR, load, SAMPLES)[1])
+
+
+def test_a_gust_is_seen_through_what_swings_after_it() -> None:
+    """Each edge leaves swings that a window half a period off would have the other way round."""
+    begins = np.arange(0.0, 40.0, 0.25)
+    changed = np.array([moved(gust(1.0, begin, 1e3, SAMPLES)) for begin in begins])
+    found, _ = steady(of_steps(begins, changed, moved(gust(-300.0, 11.77, 25.56, SAMPLES))))
+    assert found.force == pytest.approx(-300.0, rel=0.05)
+    assert found.begin == pytest.approx(11.77, abs=0.15)
+    assert found.begin + found.duration == pytest.approx(25.56, abs=0.15)
+
+
+def test_a_swinging_load_is_seen_through_what_swings_itself() -> None:
+    begins = np.arange(0.0, 40.0, 0.25)
+    changed = np.array([moved(gust(1.0, begin, 1e3, SAMPLES)) for begin in begins])
+    wave = 300.0 * np.cos(2.0 * math.pi * 0.3 * (SAMPLES - 9.0) + 0.5)
+    always, _ = swings(of_steps(begins, changed, moved(wave)))
+    _, late = swings(of_steps(begins, changed, moved(np.where(SAMPLES < 9.0, 0.0, wave))))
+    assert always.frequency == pytest.approx(0.3, abs=1.0 / (4.0 * 40.0))
+    assert late.frequency == pytest.approx(0.3, abs=1.0 / (4.0 * 40.0))
+    assert late.begin == pytest.approx(9.0, abs=0.5)
+    assert late.force == pytest.approx(300.0, rel=0.1)

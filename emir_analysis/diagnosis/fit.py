@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
 LEAST_STEP = 1e-5  # relative, of the change: not met because steps that lead nowhere were cut
+DESCENTS = 8  # steps of a descent at most
+DAMPINGS = np.geomspace(1.0, 1e-8, 5)  # of its steps, in units of the largest curvature
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
 
@@ -67,22 +69,13 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     low, high = problem.low, problem.high
     margin = 1e-6 * np.minimum(high - low, 1.0)
     start = np.clip(problem.start, low + margin, high - margin)
-    # What neither data nor maker tell is held where it begins: with a singular Jacobian the
-    # trust region's step would be filled up with it, by an amount that rounding decides.
-    weight = np.where(problem.stated, 1.0 / TOLERANCE_SPREAD, HELD)
-    expected = np.where(problem.stated, 0.0, start)
+    held = _Held(problem, start)
 
     def residuals(change: Array) -> Array:
-        x = start + change
-        return np.concatenate([problem.model(x[None])[0], weight * (x - expected)])
+        return np.asarray(held.residuals((start + change)[None])[0])
 
     def jacobian(change: Array) -> Array:
-        x = start + change
-        steps = np.where(x + problem.step > high, -problem.step, problem.step)
-        values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
-        slopes = (values[1:] - values[0]) / steps[:, None]
-        # a neighbour that cannot be simulated says nothing about the slope
-        return np.vstack([np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0), np.diag(weight)])
+        return held.slopes(start + change)[1]
 
     # As a change from the start, since the trust region is at first as large as what it is given,
     # or one for zero: where a fit begins is no measure of how far a first step may lead.
@@ -96,15 +89,75 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         ftol=accuracy,
         max_nfev=EVALUATIONS,
     )
-    curvature = np.asarray(result.jac)
-    inverse = np.linalg.pinv(curvature.T @ curvature)
-    # misfit beyond the noise widens the spread: the noise is not all that the model leaves
-    excess = max(1.0, float(np.mean(np.square(result.fun))))
-    covariance = inverse * excess
-    untold = np.flatnonzero(~np.any(curvature[: -start.size], axis=0) & ~problem.stated)
-    covariance[untold, untold] = np.inf
     return Solution(
         np.clip(start + result.x, low, high),
-        covariance,
+        held.covariance(np.asarray(result.jac), result.fun),
         math.sqrt(2.0 * result.cost / result.fun.size),
     )
+
+
+def descended(problem: Problem, accuracy: float) -> Solution:
+    """Minimise the squared residuals as `fit` does, where they are rough.
+
+    No trust region can be learned there from the last step. Levenberg and Marquardt's steps with
+    several dampings are simulated together, on all cores, and the best one is taken, as long as
+    it takes away more of the cost than the accuracy.
+    """
+    low, high = problem.low, problem.high
+    x = np.clip(problem.start, low, high)
+    held = _Held(replace(problem, coarse=None), x)
+    for _ in range(DESCENTS):
+        residuals, slopes = held.slopes(x)
+        cost = float(np.mean(np.square(residuals)))
+        if not math.isfinite(cost):
+            return Solution(x, np.full((x.size, x.size), np.inf), math.inf)
+        left, sizes, right = np.linalg.svd(slopes, full_matrices=False)
+        damped = sizes / (sizes**2 + DAMPINGS[:, None] * sizes[0] ** 2)
+        tried = np.clip(x - (damped * (left.T @ residuals)) @ right, low, high)
+        costs = np.mean(np.square(held.residuals(tried)), axis=1)
+        costs = np.where(np.isfinite(costs), costs, np.inf)
+        best = int(np.argmin(costs))
+        if costs[best] < cost:
+            x = tried[best]
+        if costs[best] > (1.0 - accuracy) * cost:
+            break
+    misfit = math.sqrt(min(cost, float(costs[best])))
+    return Solution(x, held.covariance(slopes, residuals), misfit)
+
+
+class _Held:
+    """A problem's residuals, and behind them how far each parameter is from where it is held.
+
+    What neither data nor maker tell is held where the fit begins: with a singular Jacobian the
+    trust region's step would be filled up with it, by an amount that rounding decides.
+    """
+
+    def __init__(self, problem: Problem, start: Array) -> None:
+        self._problem = problem
+        self._weight = np.where(problem.stated, 1.0 / TOLERANCE_SPREAD, HELD)
+        self._expected = np.where(problem.stated, 0.0, start)
+
+    def residuals(self, points: Array) -> Array:
+        """Return the residuals, (m, n + k), of points, (m, k)."""
+        return np.hstack([self._problem.model(points), self._weight * (points - self._expected)])
+
+    def slopes(self, x: Array) -> tuple[Array, Array]:
+        """Return the residuals, (n + k,), at x, (k,), and their slopes, (n + k, k)."""
+        problem = self._problem
+        steps = np.where(x + problem.step > problem.high, -problem.step, problem.step)
+        values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
+        slopes = (values[1:] - values[0]) / steps[:, None]
+        # a neighbour that cannot be simulated says nothing about the slope
+        slopes = np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0)
+        residuals = np.append(values[0], self._weight * (x - self._expected))
+        return residuals, np.vstack([slopes, np.diag(self._weight)])
+
+    def covariance(self, slopes: Array, residuals: Array) -> Array:
+        """Return the covariance, (k, k), from slopes, (n + k, k), and residuals, (n + k,)."""
+        inverse = np.linalg.pinv(slopes.T @ slopes)
+        # misfit beyond the noise widens the spread: the noise is not all that the model leaves
+        covariance = inverse * max(1.0, float(np.mean(np.square(residuals))))
+        told = np.any(slopes[: -len(slopes.T)], axis=0) | self._problem.stated
+        untold = np.flatnonzero(~told)
+        covariance[untold, untold] = np.inf
+        return np.asarray(covariance, dtype=np.float64)

@@ -7,13 +7,14 @@ friction falls behind the break-away and rises with speed lies between two windo
 so the fullest law is fitted, and what is not needed is left out.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import Solution, fit
+from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -28,6 +29,8 @@ SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other in
 ACCURACY = 1e-4  # relative, of the free run's squared error
 ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
 ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
+
+Method = Callable[[Problem, float], Solution]
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
@@ -76,13 +79,14 @@ def begun(start: Trial, evidence: Evidence) -> Trial:
     starts = shapes(start, STRIBECK, first)[:STARTS]
     fits = [_fitted(each, first, _at_rest(each, evidence), ROUGH) for each in starts]
     best = min(fits, key=lambda solution: solution.misfit)
-    return start.continued(_led(start, evidence, best.x, FIRST, DECIDED))
+    return start.continued(_led(start, evidence, best.x, FIRST, DECIDED, fit))
 
 
 def grown(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole."""
     end = max(float(e.time[-1]) for e in evidence.experiments)
-    return known.continued(_led(known, evidence, _at_rest(known, evidence), DECIDED, end))
+    x = _at_rest(known, evidence)
+    return known.continued(_led(known, evidence, x, DECIDED, end, descended))
 
 
 def further(known: Trial, evidence: Evidence) -> Trial:
@@ -95,12 +99,15 @@ def _at_rest(known: Trial, evidence: Evidence) -> Array:
     return np.append(known.x, np.zeros(2 * len(evidence.experiments)))
 
 
-def _led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
+def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
+    known: Trial, evidence: Evidence, x: Array, time: float, end: float, method: Method
+) -> Solution:
     """Fit to beginnings that grow from a time to another, s."""
-    fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY)
+    fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY, method)
     while time < end:
         time, x = _next(known, evidence, fitted, time, end)
-        fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY if time < end else ACCURACY)
+        accuracy = ON_THE_WAY if time < end else ACCURACY
+        fitted = _fitted(known, evidence.until(time), x, accuracy, method)
     return fitted
 
 
@@ -129,9 +136,11 @@ def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:
     return np.asarray(np.nan_to_num(np.sqrt(np.mean(np.square(left), axis=1)), nan=np.inf))
 
 
-def _fitted(known: Trial, evidence: Evidence, x: Array, accuracy: float = ACCURACY) -> Solution:
+def _fitted(
+    known: Trial, evidence: Evidence, x: Array, accuracy: float, method: Method = fit
+) -> Solution:
     problem = free_run_problem(known, evidence, x)
-    return fit(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
+    return method(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
 
 
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:

@@ -1,17 +1,24 @@
 """Least squares of the diagnosis: what the data do not tell stays where it is."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from emir_analysis.diagnosis.fit import Problem, Solution, fit
+from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.signals import Array
 
 SIZE = 9  # numbers to be fitted
 UNTOLD = [4, 7]  # those that the data do not depend on
 FAR = 20.0  # bounds of all
 
+Method = Callable[[Problem, float], Solution]
+both = pytest.mark.parametrize("method", [fit, descended])
 
-def fitted(seed: int, untold: Array, *, stated: bool) -> tuple[Solution, Array, Array]:
+
+def fitted(
+    seed: int, untold: Array, *, stated: bool, method: Method = fit
+) -> tuple[Solution, Array, Array]:
     """Fit random, slightly curved residuals; return truth, (k,), and slopes, (n, k), too.
 
     untold: (2,) where the numbers without effect begin; stated: whether a maker states them.
@@ -30,14 +37,15 @@ def fitted(seed: int, untold: Array, *, stated: bool) -> tuple[Solution, Array, 
     held = np.zeros(SIZE, dtype=bool)
     held[UNTOLD] = stated
     low, high = np.full(SIZE, -FAR), np.full(SIZE, FAR)
-    return fit(Problem(model, start, low, high, held), 1e-3), true, slopes
+    return method(Problem(model, start, low, high, held), 1e-3), true, slopes
 
 
+@both
 @pytest.mark.parametrize("seed", range(5))
-def test_numbers_without_effect_stay_where_they_begin(seed: int) -> None:
+def test_numbers_without_effect_stay_where_they_begin(seed: int, method: Method) -> None:
     """They take no part in a step, however far the trust region reaches."""
     untold = np.array([-3.0, 6.9])
-    solution, true, _ = fitted(seed, untold, stated=False)
+    solution, true, _ = fitted(seed, untold, stated=False, method=method)
     true[UNTOLD] = untold
     assert solution.x == pytest.approx(true, abs=1e-3)
     assert np.all(np.isinf(np.diag(solution.covariance)[UNTOLD]))
@@ -50,9 +58,10 @@ def test_what_a_maker_states_goes_back_to_that() -> None:
     assert np.diag(solution.covariance)[UNTOLD] == pytest.approx(1.0 / 3.0, rel=1e-3)
 
 
-def test_the_covariance_is_the_textbook_s() -> None:
+@both
+def test_the_covariance_is_the_textbook_s(method: Method) -> None:
     """(J'J)^-1 for residuals in units of the noise."""
-    solution, _, slopes = fitted(0, np.zeros(2), stated=False)
+    solution, _, slopes = fitted(0, np.zeros(2), stated=False, method=method)
     told = np.setdiff1d(np.arange(SIZE), UNTOLD)
     expected = np.linalg.inv(slopes[:, told].T @ slopes[:, told])
     assert solution.covariance[np.ix_(told, told)] == pytest.approx(expected, rel=1e-2, abs=1e-9)
@@ -67,3 +76,14 @@ def test_vectors_drawn_from_a_fit_have_its_spread() -> None:
     scaled = (drawn - solution.x)[:, told] / np.sqrt(np.diag(solution.covariance)[told])
     assert np.all(np.abs(scaled.mean(axis=0)) < 5.0 / np.sqrt(20000))
     assert scaled.std(axis=0) == pytest.approx(1.0, rel=0.03)
+
+
+def test_a_descent_from_where_nothing_can_be_simulated_says_so() -> None:
+    """Its misfit is infinite; others are then better."""
+
+    def model(points: Array) -> Array:
+        return np.full((len(points), 10), np.nan)
+
+    one = np.ones(1)
+    problem = Problem(model, 0.0 * one, -one, one, np.zeros(1, dtype=bool))
+    assert descended(problem, 1e-3).misfit == np.inf

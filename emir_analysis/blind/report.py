@@ -54,7 +54,8 @@ def _confusion(outcomes: Sequence[Outcome]) -> str:
         name = " + ".join(sorted(hidden[key].hidden)) or "nothing"
         if hidden[key].kind == "foreign":
             name += " (foreign)"
-        lines.append(f"{name + '  ':50}" + ", ".join(f"{count} {answer}" for answer, count in answers))
+        told = ", ".join(f"{count} {answer}" for answer, count in answers)
+        lines.append(f"{name + '  ':50}{told}")
     return "\n".join(lines)
 
 

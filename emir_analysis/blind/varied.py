@@ -5,14 +5,10 @@ so that pressures, times and angles of rest stay of the order of the first; then
 varied by itself.
 """
 
-import math
 from dataclasses import replace
 
-import numpy as np
-
+from emir_analysis.blind.hidden import Random, between
 from emir_analysis.blind.numbers import Numbers, Stated
-
-Random = np.random.Generator
 
 SIZE = (0.4, 1.3)  # times the boom's length
 RATES = (50.0, 100.0, 100.0, 200.0)  # 1/s, of the sensors
@@ -50,7 +46,7 @@ def _resized(n: Numbers, random: Random) -> Numbers:
     Its cylinder carries the boom at about the same share of the pump's pressure and moves it
     through its range in about the same time; its boom swings the slower the longer it is.
     """
-    size = _between(random, *SIZE)
+    size = between(random, *SIZE)
     mass = size**2 * random.uniform(0.7, 1.4)
     frequency = random.uniform(0.8, 1.3) / size
     arms = int(random.integers(3, 7))
@@ -89,7 +85,7 @@ def _other_hydraulics(n: Numbers, random: Random) -> Numbers:
     return replace(
         n,
         modal_damping=random.uniform(0.005, 0.03),
-        beta=_between(random, 4e8, 1.4e9),
+        beta=between(random, 4e8, 1.4e9),
         dead_zone=random.uniform(0.04, 0.2),
         natural_frequency=n.natural_frequency * random.uniform(0.4, 1.5),
         damping=random.uniform(0.6, 1.0),
@@ -102,13 +98,8 @@ def _other_sensors(n: Numbers, random: Random) -> Numbers:
     return replace(
         n,
         resolver_bits=int(random.choice(RESOLVER_BITS)),
-        pressure_noise=_between(random, 0.05e5, 0.5e5),
-        deflection_noise=_between(random, 1e-5, 6e-5),
+        pressure_noise=between(random, 0.05e5, 0.5e5),
+        deflection_noise=between(random, 1e-5, 6e-5),
         rate=float(random.choice(RATES)),
         command_period=float(random.choice(COMMAND_PERIODS)),
     )
-
-
-def _between(random: Random, low: float, high: float) -> float:
-    """Return a number between two positive ones, its logarithm evenly spread."""
-    return math.exp(random.uniform(math.log(low), math.log(high)))

@@ -91,6 +91,7 @@ def swings(response: Response) -> tuple[Load, Load]:
     begin, gram, right = response
     window = float(begin[1] - begin[0])
     length = window * begin.size
+    after, behind = np.triu(gram), np.triu(gram, 1)
     always, later = [], []
     for f in np.arange(1, int(FASTEST * FREQUENCIES * length)) / (FREQUENCIES * length):
         wave = np.exp(2j * np.pi * f * (begin + 0.5 * window))
@@ -100,8 +101,8 @@ def swings(response: Response) -> tuple[Load, Load]:
         normal = np.empty((along.shape[1], 2, 2))
         for row, one in enumerate(columns):
             for column, other in enumerate(columns):
-                both = _to_the_end(_to_the_end(np.outer(one, other) * gram).T)
-                normal[:, row, column] = np.diagonal(both)[:-FEWEST]
+                both = one * (after @ other) + other * (behind @ one)
+                normal[:, row, column] = _to_the_end(both)[:-FEWEST]
         normal += WEAK * gram.max() * np.eye(2)
         solved = np.linalg.solve(normal, along.T[:, :, None])[:, :, 0]
         gained = np.sum(solved * along.T, axis=1)

@@ -29,7 +29,7 @@ SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simu
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 FORCE = list(BALANCES).index("force")
 LOAD = "external_load"
-LOAD_STEP = 0.25  # s: between begins of a load that are tried; a third of it shifts the slow mode
+LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 
 Missing = Callable[[list[Trial]], Array]
 

@@ -83,7 +83,7 @@ def test_a_seed_gives_the_same_machine_and_its_effect_matters(
 def test_a_varied_machine_is_another_one_that_works_as_well(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """It rests and moves with pressures between tank and pump, and its sheet can be read."""
+    """It rests and moves, no pressure far above the pump's, and its sheet can be read."""
     monkeypatch.setattr(puzzles, "PROBE", 4.0)
     for seed in range(8):
         stated = varied(read_numbers(DATA_SHEET), np.random.default_rng(seed))

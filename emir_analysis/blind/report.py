@@ -97,13 +97,13 @@ def _errors(outcomes: Sequence[Outcome]) -> str:
     found = [o for o in outcomes if o.hidden and o.kind != "foreign" and right(o) and o.errors]
     if not found:
         return ""
-    names = list(found[0].errors["nominal"])
+    names = list(dict.fromkeys(name for o in found for name in o.errors["nominal"]))
     lines = ["free-run error over sensor noise on the judge recording, where found: median (worst)"]
     lines.append(" " * 24 + "".join(f"{label:>24}" for label in STAGES.values()))
     for name in names:
         cells = []
         for stage in STAGES:
-            values = [o.errors[stage][name] for o in found]
+            values = [o.errors[stage][name] for o in found if name in o.errors[stage]]
             cells.append(f"{np.median(values):10.2f} ({max(values):.2f})")
         lines.append(f"{name:24}" + "".join(f"{cell:>24}" for cell in cells))
     down = sum(max(o.errors["with_effect"].values()) <= AT_NOISE for o in found)

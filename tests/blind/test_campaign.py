@@ -185,6 +185,16 @@ def test_figures_mean_what_they_say() -> None:
     assert "every signal within 1.1 times the noise: 2 of 2" in lines
 
 
+def test_machines_may_have_different_sensors() -> None:
+    """The figures of a signal are those of the machines that have it."""
+    outcomes = [outcome(k, "one", ["payload"], "found", ["payload"]) for k in range(3)]
+    for stage, errors in outcomes[1].errors.items():
+        errors["pressure_lifting"] = 5.0 if stage == "nominal" else 1.0
+    lines = [" ".join(line.split()) for line in report(outcomes).splitlines()]
+    assert "pressure_lifting 5.00 (5.00) 1.00 (1.00) 1.00 (1.00)" in lines
+    assert "every signal within 1.1 times the noise: 3 of 3" in lines
+
+
 @pytest.mark.parametrize(
     ("words", "reason"),
     [

@@ -34,6 +34,7 @@ SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no s
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 SETTLING = 5.0  # s from the start in which the state at rest is found
+RESTS = 21  # pressures at rest, from the least to the most, that are tried where none is shown
 
 
 @dataclass(frozen=True)
@@ -317,18 +318,25 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
 
 
 def _settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
-    """Return the state `at_rest` as the two numbers of `Starts`."""
+    """Return the state `at_rest` as the two numbers of `Starts`.
+
+    Where no sensor shows p_S it may be anywhere, so the fit begins at the best of several.
+    """
     early, starts = experiment.until(SETTLING), Starts(experiment, evidence)
 
     def model(points: Array) -> Array:
         machines = [machine] * len(points)
         return _free_run_errors(machines, early, evidence, starts.at(points))
 
+    points = np.zeros((1, 2))
+    if PRESSURE_LOWERING not in evidence.measured:
+        points = np.column_stack([np.zeros(RESTS), np.linspace(-1.0, 1.0, RESTS)])
+    cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
+    best: Array = points[int(np.argmin(cost))]
+    if not np.isfinite(np.min(cost)):
+        return best
     none = np.zeros(2, dtype=bool)
-    problem = Problem(model, np.zeros(2), -np.ones(2), np.ones(2), none)
-    if not np.all(np.isfinite(model(np.zeros((1, 2))))):
-        return np.zeros(2)
-    return fit(problem, ACCURACY).x
+    return fit(Problem(model, best, -np.ones(2), np.ones(2), none), ACCURACY).x
 
 
 def _free_run_errors(

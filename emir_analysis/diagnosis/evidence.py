@@ -76,8 +76,9 @@ class Evidence:
         }
 
     def residuals(self, machines: Sequence[Machine]) -> Array:
-        """Return what is missing in each balance, (m, w, 5), SI units."""
-        return np.concatenate([b.residuals(machines) for b in self._balances], axis=1)
+        """Return what is missing in each balance, (m, w, 5), SI units; NaN where it is not told."""
+        left = np.concatenate([b.residuals(machines) for b in self._balances], axis=1)
+        return np.asarray(np.where(self.told, left, np.nan))
 
     def one_step(self, machine: Machine) -> Array:
         """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
@@ -92,9 +93,9 @@ class Evidence:
     def floor(self, machine: Machine) -> Array:
         """Return the level, (5,), that the sensors of a machine alone leave in each balance.
 
-        The linkage balance is exact: there it is the stroke's own noise.
+        NaN where it is not told. The linkage balance is exact: there it is the stroke's own noise.
         """
         left = np.concatenate([noise_floor(e, machine) for e in self.experiments])
-        floor = level(left)
+        floor = np.where(self.told, level(left), np.nan)
         floor[LINKAGE] = self.sensors[0]
         return floor

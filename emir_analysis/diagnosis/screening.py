@@ -191,11 +191,13 @@ def _in_balances(evidence: Evidence, floor: Array) -> Missing:
 
 
 def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
-    """Return loads at the TCP by the force missing in the first recording."""
+    """Return loads at the TCP by the force missing in the first recording, none if not told."""
+    if not evidence.told[FORCE]:
+        return []
     force = evidence.residuals([known.machine])[0][: evidence.windows_of_first, FORCE]
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
-    return likely(of_force(evidence.time[: force.size], np.nan_to_num(at_tip * force)))
+    return likely(of_force(evidence.time[: force.size], at_tip * np.nan_to_num(force)))
 
 
 def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) -> list[Load]:

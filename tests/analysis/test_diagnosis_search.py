@@ -1,12 +1,21 @@
 """Where a run starts, and that only effects stay in a model which its recordings need."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import recorded
 
-from emir_analysis.diagnosis.balances import sensed
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
-from emir_analysis.diagnosis.diagnose import Search
+from emir_analysis.diagnosis.balances import BALANCES, sensed
+from emir_analysis.diagnosis.candidates import (
+    Trial,
+    at_rest,
+    fit_balances,
+    fit_free_run,
+    trial,
+)
+from emir_analysis.diagnosis.diagnose import Search, loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
@@ -20,21 +29,32 @@ FRICTION = {"effects.viscous_friction.coefficient": 1e5}  # N s/m
 SHIFT = {"effects.valve_null_offset.offset": 0.03}
 
 
-def run(machine: Machine, duration: float = 16.0) -> Experiment:
-    """Return a run of a machine as its sensors show it."""
+def run(machine: Machine, duration: float = 16.0, pressure: float = 20e5) -> Experiment:
+    """Return a run of a machine, from a p_S at rest, Pa, as its sensors show it."""
     held = round(recorded.COMMAND_PERIOD / COMMAND_STEP)
     commands = np.repeat(recorded.moves(duration, seed=5), held)
     samples = commands.size // 10 + 1
     empty = Experiment(
         "run", 10 * COMMAND_STEP, commands, np.zeros(samples), np.zeros((samples, 4)), 20
     )
-    return sensed(empty, machine, free_runs([machine], empty, [(0.8, 20e5)])[0])
+    return sensed(empty, machine, free_runs([machine], empty, [(0.8, pressure)])[0])
 
 
-def search(missing: dict[str, float]) -> tuple[Search, Sheet, Evidence]:
+def without_p_s(experiment: Experiment) -> Experiment:
+    """Return an experiment whose p_S no sensor shows."""
+    outputs = experiment.outputs.copy()
+    outputs[:, 2] = np.nan
+    return replace(
+        experiment, outputs=outputs, measured=experiment.measured - {"pressure_lowering"}
+    )
+
+
+def search(
+    missing: dict[str, float], seen: Callable[[Experiment], Experiment] = lambda e: e
+) -> tuple[Search, Sheet, Evidence]:
     """Return the search for what a data sheet lacks, before its first round."""
     stated = joint1()
-    evidence = Evidence([run(with_values(stated, missing))], stated)
+    evidence = Evidence([seen(run(with_values(stated, missing)))], stated)
     sheet = Sheet(stated, TOLERANCES, {}, ())
     return Search(evidence, sheet, lambda _: None), sheet, evidence
 
@@ -66,6 +86,26 @@ def test_readings_that_stay_the_same_count_as_one() -> None:
     shown = Experiment("steps", 0.01, np.zeros(0), np.zeros(6), outputs, 1)
     assert shown.weights[:, 0] == pytest.approx([1.0, 0.5, 0.5, 0.5, 0.5, 1.0])
     assert np.all(shown.weights[:, 1:] == 1.0)
+
+
+@pytest.mark.parametrize("pressure", [5e5, 12e5, 20e5, 50e5, 90e5])
+def test_a_pressure_at_rest_that_no_sensor_shows_is_told_by_the_motion(pressure: float) -> None:
+    machine = joint1()
+    experiment = without_p_s(run(machine, 12.0, pressure))
+    found = at_rest(machine, experiment, Evidence([experiment], machine))[1]
+    assert found == pytest.approx(pressure, abs=2.0 * machine.sensors.pressure_noise)
+
+
+def test_a_balance_without_its_sensor_says_nothing() -> None:
+    """Neither of a machine that is far off: force, lowering chamber and bending need p_S."""
+    stated = joint1()
+    evidence = Evidence([without_p_s(run(with_values(stated, FRICTION)))], stated)
+    left, floor = evidence.residuals([stated])[0], evidence.floor(stated)
+    silent = [name in {"force", "lowering_chamber", "bending"} for name in BALANCES]
+    assert np.all(np.isnan(left[:, silent]))
+    assert np.all(np.isfinite(left[:, np.invert(silent)]))
+    assert np.array_equal(np.isnan(floor), silent)
+    assert loudest(1e6 * left, floor, evidence) == "lifting_chamber"
 
 
 def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:

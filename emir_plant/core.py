@@ -41,7 +41,7 @@ MODES = DELAY_LINE + command_delay.SIZE
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging: the phase that
 # Runge-Kutta loses in it adds up over seconds and shifts the instants of sticking
-SWING = 2e-3  # m/s, amplitude of the piston in that mode from which on they are taken
+SWING = 2e-4  # m/s, amplitude of the piston in that mode from which on they are taken
 
 
 class Truth(NamedTuple):

@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.candidates import (
     trial,
 )
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.experiment import SHORTEST, Experiment
 from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
 from emir_analysis.diagnosis.select import (
@@ -174,11 +174,8 @@ class Search:
             equal = _as_good(better)
             before[equal[0].effects] = equal
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
-            left = self._excess(best.trial)
-            if sticks(best.trial) and LEFT**2 - 1.0 < left < HOPELESS**2 - 1.0:
-                told = self._by_beginning(best)
-                equal = equal if told is best else [told.trial]
-                best = told
+            if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
+                equal, best = self._by_beginning(equal, best)
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
@@ -187,6 +184,9 @@ class Search:
             better = self._by_balances(self._pairs(plain, best), best)
             if better:
                 equal = _as_good(better)
+                pair = next(t for t in better if t.trial is equal[0])
+                if sticks(pair.trial):  # however far off: where it sticks drives it away
+                    equal, _ = self._by_beginning(equal, pair)
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
 
@@ -248,25 +248,27 @@ class Search:
         near = self._excess(best.trial) < HOPELESS**2
         return replace(best, trial=self.whole(best.trial)) if near else best
 
-    def _by_beginning(self, best: Tried) -> Tried:
-        """Return a trial that sticks with the friction that a growing beginning tells.
+    def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
+        """Return the best trials, one that sticks, with the friction that a beginning tells.
 
-        The trial itself where that is no better on the whole.
+        The same where that is no better on the whole, or where they leave nothing.
         """
+        if self._excess(best.trial) <= LEFT**2 - 1.0:
+            return equal, best
         self._progress(f"friction by a growing beginning: {best.trial.name}")
         begin = self._evidence.until(DECIDED)
-        start = fit_balances(fullest(best.trial, self._sheet), begin, self.floor)
-        law = self.with_less_friction(begun(start, self._evidence), begin)
+        start = fullest(best.trial, self._sheet)
+        law = self.with_less_friction(begun(start, self._evidence, self.floor), begin)
         if set(law.effects) == set(best.trial.effects) and _at_noise(best.trial, self._evidence):
-            return best
+            return equal, best
         found = grown(law, self._evidence)
         if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
-            return best
+            return equal, best
         self._whole[found.effects] = found
         self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
         told = self._scored(found, free_run_score(found, self._evidence))
         self.tried.append(told)
-        return told
+        return [found], told
 
     def with_less_friction(self, known: Trial, begin: Evidence) -> Trial:
         """Return a trial with as little friction as will do over a beginning.
@@ -297,14 +299,17 @@ class Search:
     def _beside(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more.
 
-        Where missing sensors leave balances out, what those would show is in the free run alone.
+        Where missing sensors leave balances out, what those would show is in the free run alone:
+        that is asked too where the others lead nowhere near.
         """
+        better = []
         if np.any(self._evidence.fitted):
             found = screen(best.trial, self._sheet, self._head, self.floor)
             better = self._by_balances(found, best)
-            if better or np.all(self._evidence.told):
+            near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
+            if near or np.all(self._evidence.told):
                 return better
-        return self._better(self._on_free_run(best), best)
+        return better + self._better(self._on_free_run(best), best)
 
     def _beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.
@@ -317,8 +322,12 @@ class Search:
         return [t for t in better if _free(t) < close and self._excess(self.whole(t.trial)) < least]
 
     def _on_free_run(self, best: Tried) -> list[Tried]:
-        """Return the trials with one effect more that promise most on the free run."""
-        found = screen_free_run(best.trial, self._sheet, self._head)
+        """Return the trials with one effect more that promise most on the free run.
+
+        Where it has long gone astray no first-order step says anything.
+        """
+        near = self._head.until(_astray(best.trial, self._head) + SHORTEST)
+        found = screen_free_run(best.trial, self._sheet, near)
         return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
 
     def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
@@ -394,6 +403,17 @@ def _excess(tried: Trial, evidence: Evidence) -> float:
     """
     errors = np.concatenate(free_run_errors(tried.machine, evidence))
     return float(np.mean(errors**2) - 1.0)
+
+
+def _astray(tried: Trial, evidence: Evidence) -> float:
+    """Return until when, s, the free run of any recording stays near the machine."""
+    near = []
+    for experiment, errors in zip(
+        evidence.experiments, free_run_errors(tried.machine, evidence), strict=True
+    ):
+        so_far = np.cumsum(np.mean(errors**2, axis=1)) / np.arange(1, len(errors) + 1)
+        near.append(experiment.period * np.count_nonzero(so_far <= HOPELESS**2))
+    return float(max(near))
 
 
 def _at_noise(tried: Trial, evidence: Evidence) -> bool:

@@ -12,14 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
+from emir_analysis.diagnosis.friction_starts import friction_starts
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
-STARTS = 12  # shapes near standstill from which the first beginning is fitted
+STARTS = 12  # from which the first beginning is fitted at a time ...
+TRIED = 24  # ... and in all, as long as none comes to the noise
+LED = (6, 3)  # of the best, along the next beginnings
+SAME = 1.001  # ratio of the errors of two fits up to which they are the same minimum
 GROWTH = 1.5  # of a beginning from one to the next
 LEAP = 3.0  # the same where the free run follows the machine until then
 FOLLOWS = 1.05  # times the error so far: the most over a longer beginning that it follows
@@ -33,6 +38,7 @@ ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest 
 Method = Callable[[Problem, float], Solution]
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
+FORCE = list(BALANCES).index("force")
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 
 
@@ -69,17 +75,38 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     return found
 
 
-def begun(start: Trial, evidence: Evidence) -> Trial:
+def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 
     Over the first beginning it is fitted from those shapes of the friction near standstill whose
-    free run is best there; the best of these fits is led on.
+    free run is best there. The best fits are led on, fewer each time: it takes some sticks to
+    tell two minima apart. floor: (5,) what the sensors leave in each balance.
     """
-    first = evidence.until(FIRST)
-    starts = shapes(start, STRIBECK, first)[:STARTS]
-    fits = [_fitted(each, first, _at_rest(each, evidence), ROUGH) for each in starts]
-    best = min(fits, key=lambda solution: solution.misfit)
-    return start.continued(_led(start, evidence, best.x, FIRST, DECIDED, fit))
+    if evidence.told[FORCE]:
+        starts = friction_starts(start, evidence, floor, FIRST)
+    else:
+        starts = shapes(start, STRIBECK, evidence.until(FIRST))
+    time, first = FIRST, evidence.until(FIRST)
+    points = [_at_rest(each, evidence) for each in starts]
+    fits: list[Solution] = []
+    for k in range(0, TRIED, STARTS):
+        fits += [_fitted(start, first, x, ROUGH) for x in points[k : k + STARTS]]
+        if min(each.misfit for each in fits) <= 1.0:
+            break
+    for count in LED:
+        time *= GROWTH
+        points = [found.x for found in _distinct(fits)[:count]]
+        fits = [_fitted(start, evidence.until(time), x, ROUGH) for x in points]
+    return start.continued(_led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit))
+
+
+def _distinct(fits: list[Solution]) -> list[Solution]:
+    """Return the solutions, the best first, each minimum once."""
+    found: list[Solution] = []
+    for solution in sorted(fits, key=lambda each: each.misfit):
+        if not found or solution.misfit > SAME * found[-1].misfit:
+            found.append(solution)
+    return found
 
 
 def grown(known: Trial, evidence: Evidence) -> Trial:

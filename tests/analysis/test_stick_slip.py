@@ -5,7 +5,8 @@ import pytest
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
-from emir_analysis.diagnosis.stick_slip import DECIDED, begun, fullest, grown, nested
+from emir_analysis.diagnosis.friction_starts import friction_starts
+from emir_analysis.diagnosis.stick_slip import DECIDED, FIRST, STARTS, begun, fullest, grown, nested
 from emir_plant.sheet import Sheet, joint1
 
 HIDDEN = {
@@ -25,9 +26,8 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     """Begun without any knowledge of the break-away, the fit ends at what was hidden."""
     searched, sheet, evidence = search(HIDDEN)
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
-    start = fit_balances(fullest(known, sheet), evidence, searched.floor)
     begin = evidence.until(DECIDED)
-    law = begun(start, evidence)
+    law = begun(fullest(known, sheet), evidence, searched.floor)
     assert searched.with_less_friction(law, begin) is law
     found = grown(law, evidence)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
@@ -38,11 +38,23 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     assert found.machine.effects.viscous_friction.coefficient == pytest.approx(8e4, rel=0.05)
 
 
+def test_the_balances_say_how_much_friction_there_is_beside_its_shape() -> None:
+    """Begun at 3 kN without knowing any; the shapes on either side of the hidden one lead."""
+    searched, sheet, evidence = search(HIDDEN)
+    start = fullest(trial(sheet, ()), sheet)
+    found = friction_starts(start, evidence, searched.floor, FIRST)
+    leading = [t.machine.effects.stribeck_friction for t in found[:STARTS]]
+    for friction in leading:
+        assert friction.force == pytest.approx(2e4, rel=0.15)
+    shapes = {(f.breakaway, round(f.stribeck_speed, 5)) for f in leading}
+    assert {(1.4, 5e-3), (1.7, 5e-3)} <= shapes
+
+
 def test_no_more_friction_stays_than_there_is() -> None:
     """A machine with Coulomb friction alone."""
     searched, sheet, evidence = search(SLIDING)
-    start = fit_balances(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
-    law = searched.with_less_friction(begun(start, evidence), evidence.until(DECIDED))
+    law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
+    law = searched.with_less_friction(law, evidence.until(DECIDED))
     fitted = grown(law, evidence)
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))

@@ -1,0 +1,89 @@
+"""Where a fit of friction begins: many shapes near standstill, all else by the balances.
+
+The balances' windows tell how much friction there is, but hardly how it falls behind the
+break-away: that lies between two of them. With a shape given, how much it is and what else is
+fitted is a nearly linear problem, and the whole recordings answer it.
+"""
+
+from itertools import product
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from emir_analysis.diagnosis.candidates import Trial, coarse_errors
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD
+from emir_analysis.signals import Array
+
+SHAPES = {  # that are tried in all combinations
+    "effects.stribeck_friction.breakaway": (1.15, 1.4, 1.7, 2.2),  # 1
+    "effects.stribeck_friction.stribeck_speed": (2.5e-3, 5e-3, 1e-2, 2e-2),  # m/s
+    "effects.stribeck_friction.smoothing_speed": (2e-4, 6e-4, 1.8e-3),  # m/s
+}
+INSIDE = 1e-6  # in units of an unknown, of its bounds, as the solver demands
+SIZES = ("effects.stribeck_friction.force", "effects.viscous_friction.coefficient")
+
+
+def friction_starts(start: Trial, evidence: Evidence, floor: Array, first: float) -> list[Trial]:
+    """Return a trial with other friction, that first whose free run begins best.
+
+    start: with `stribeck_friction` and `viscous_friction`. floor: (5,) what the sensors leave in
+    each balance. first: s, of the free run that is compared.
+    """
+    points = _by_balances(start, evidence, floor)
+    errors = coarse_errors([start.unknowns.at(x) for x in points], evidence.until(first))
+    cost = np.mean(np.square(errors), axis=1)
+    return [start.at(points[k]) for k in np.argsort(np.nan_to_num(cost, nan=np.inf))]
+
+
+def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
+    """Return vectors, (m, k), of all shapes with what else the balances say beside each."""
+
+    def missing(points: Array) -> Array:
+        left = evidence.residuals([start.unknowns.at(x) for x in points]) / floor
+        return np.nan_to_num(left[:, :, evidence.fitted].reshape(len(points), -1))
+
+    paths = [unknown.path for unknown in start.unknowns.members]
+    shaping, sizes = [paths.index(p) for p in SHAPES], [paths.index(p) for p in SIZES]
+    others = [k for k in range(len(paths)) if k not in (*shaping, *sizes)]
+    # how the others act depends little on the friction: found once
+    near = start.x + STEP * np.eye(start.x.size)[others]
+    values = missing(np.vstack([start.x, near]))
+    acting = (values[1:] - values[0]) / STEP
+    shapes = _grid(start)
+    points = np.tile(start.x, (len(shapes), 1))
+    points[:, shaping] = shapes
+    points[:, sizes] = 0.0
+    nothing = missing(points)
+    each = [missing(points + np.eye(start.x.size)[size]) - nothing for size in sizes]
+    free = np.array(others + sizes)
+    for point, left, *friction in zip(points, nothing, *each, strict=True):
+        point[free] = _least(start, point, free, left, np.vstack([acting, *friction]))
+    return points
+
+
+def _grid(start: Trial) -> Array:
+    """Return all shapes as the trial's unknowns, (m, 3)."""
+    members = {unknown.path: unknown for unknown in start.unknowns.members}
+    levels = [[members[path].at(v) for v in values] for path, values in SHAPES.items()]
+    return np.array(list(product(*levels)))
+
+
+def _least(start: Trial, point: Array, free: Array, left: Array, slopes: Array) -> Array:
+    """Return the free unknowns, (f,), that leave least of a linear model.
+
+    left: (n,) at the point, slopes: (f, n). Each of the maker's is held to what he states.
+    """
+    held = start.unknowns.toleranced[free] / TOLERANCE_SPREAD
+    low, high = (bound[free] for bound in start.unknowns.bounds)
+    origin = point[free]
+
+    def residuals(x: Array) -> Array:
+        return np.append(left + (x - origin) @ slopes, held * x)
+
+    def jacobian(_: Array) -> Array:
+        return np.vstack([slopes.T, np.diag(held)])
+
+    begin = np.clip(origin, low + INSIDE, high - INSIDE)
+    found = least_squares(residuals, begin, jacobian, bounds=(low, high), loss="soft_l1")
+    return np.asarray(found.x)

@@ -197,8 +197,21 @@ class Search:
             fitted = refine_free_run(chosen, self._evidence)
             if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
                 fitted = self._with_fewer_sizes(fitted)
+                fitted = fitted if sticks(fitted) else self._refined_again(fitted)
             self._whole[chosen.effects] = fitted
         return self._whole[chosen.effects]
+
+    def _refined_again(self, fitted: Trial) -> Trial:
+        """Return a trial fitted again from where it ended, as long as that helps much.
+
+        Where something switches, slopes lead only a little way at a time.
+        """
+        while self._excess(fitted) > LEFT**2 - 1.0:
+            again = refine_free_run(fitted, self._evidence)
+            if self._on_whole(again) > self._on_whole(fitted) - STRONG:
+                break
+            fitted = again
+        return fitted
 
     def _with_fewer_sizes(self, full: Trial) -> Trial:
         """Return a trial with one size of its effects alone where that is better than with all.
@@ -300,14 +313,16 @@ class Search:
         """Return what is better with one effect more.
 
         Where missing sensors leave balances out, what those would show is in the free run alone:
-        that is asked too where the others lead nowhere near.
+        that is asked too where the others lead nowhere near, and where they are quiet: what acts
+        in a few windows only hardly shows in them.
         """
         better = []
         if np.any(self._evidence.fitted):
             found = screen(best.trial, self._sheet, self._head, self.floor)
             better = self._by_balances(found, best)
             near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
-            if near or np.all(self._evidence.told):
+            complete = np.all(self._evidence.told) and (better or not self._quiet(best.trial))
+            if near or complete:
                 return better
         return better + self._better(self._on_free_run(best), best)
 

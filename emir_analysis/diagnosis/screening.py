@@ -24,6 +24,7 @@ from emir_plant.sheet import Sheet
 
 ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
 STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
+STEPS = tuple(float(s) for s in range(-24, 25) if s)  # the same of a size that acts only beyond
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
@@ -257,6 +258,7 @@ def _starts(
     """Return vectors, (k,), of the effect's fields from which a fit may start.
 
     Of several sizes all together, and each alone: together one may hide what another explains.
+    One that acts only beyond some value in steps of its trial size.
     loads: at the TCP, that explain much. size: of the effect, in trial sizes.
     """
     x = np.array([unknown.start for unknown in members])
@@ -265,7 +267,11 @@ def _starts(
     sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
     allowed = [s for s in STARTS if s > 0.0 or any(u.low < 0.0 for u in members)]
     switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
-    return [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
+    starts = [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
+    for stepwise in REGISTRY[effect].stepwise:
+        on = np.array([u.path.endswith(f".{stepwise}") for u in members])
+        starts += [np.where(sizes, s * x * on, x) for s in STEPS]
+    return starts
 
 
 def _fields(members: tuple[Unknown, ...], load: Load) -> Array:

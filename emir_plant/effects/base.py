@@ -15,9 +15,12 @@ class Effect:
         switches it on.
     source: where the term and its magnitude come from.
     trial: values at which a search for a missing effect starts, SI units.
+    stepwise: names of the sizes that act only beyond some value, and too much soon after: a search
+        goes through them in steps of their trial values.
     """
 
     balance: ClassVar[Balance]
     sizes: ClassVar[tuple[str, ...]]
     source: ClassVar[str]
     trial: ClassVar[dict[str, float]]
+    stepwise: ClassVar[tuple[str, ...]] = ()

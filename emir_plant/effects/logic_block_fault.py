@@ -22,6 +22,7 @@ class LogicBlockFault(Effect):
         "spring setting, a sticking or blocked pilot; magnitudes of a maladjusted valve"
     )
     trial: ClassVar[dict[str, float]] = {"threshold": 5e5, "closing": 0.5, "pilot": 0.1}
+    stepwise: ClassVar[tuple[str, ...]] = ("threshold",)  # crossed by few minima of p_H, or by all
 
     threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
     closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)

@@ -33,6 +33,8 @@ from emir_analysis.diagnosis.select import (
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.stick_slip import (
     DECIDED,
+    FORCE,
+    VISCOUS,
     begun,
     fullest,
     further,
@@ -40,6 +42,7 @@ from emir_analysis.diagnosis.stick_slip import (
     nested,
     simpler,
     sticks,
+    viscous_force,
 )
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -287,11 +290,15 @@ class Search:
         """Return a trial with as little friction as will do over a beginning.
 
         More has to take half of the rest away: a law that is a little off is mimicked by another.
+        And it has to be more than the force balance could tell from noise.
         """
         limit = free_run_score(known, begin, seen=0.0) + STRONG
+        _, velocity = self._evidence.signals()["piston_velocity"]
+        unheard = viscous_force(known, float(np.max(np.abs(velocity)))) < self.floor[FORCE]
         for less in simpler(known, self._sheet):
             fitted = further(less, begin)
             no_worse = free_run_score(fitted, begin, seen=0.0) < limit
+            no_worse |= unheard and VISCOUS not in less.effects
             if no_worse or 0.5 * _excess(fitted, begin) < _excess(known, begin):
                 return self.with_less_friction(fitted, begin)
         return known

@@ -75,6 +75,13 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     return found
 
 
+def viscous_force(known: Trial, velocity: float) -> float:
+    """Return a trial's viscous friction, N, at a velocity, m/s; inf where it has none."""
+    if VISCOUS not in known.effects:
+        return np.inf
+    return known.machine.effects.viscous_friction.coefficient * velocity
+
+
 def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 

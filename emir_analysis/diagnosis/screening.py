@@ -24,7 +24,8 @@ from emir_plant.sheet import Sheet
 
 ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
 STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
-STEPS = tuple(float(s) for s in range(-24, 25) if s)  # the same of a size that acts only beyond
+# the same of a size that acts only beyond some value
+STEPS = tuple(float(s) for s in range(-24, 25) if s)
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted

@@ -58,7 +58,7 @@ BALANCES = {
     "linkage": Balance("m", frozenset({ANGLE, STROKE})),
     "bending": Balance("rad", frozenset({H, S, DEFLECTION})),
 }
-LINKAGE = list(BALANCES).index("linkage")
+FORCE, LINKAGE = (list(BALANCES).index(name) for name in ("force", "linkage"))
 
 READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted signals
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend

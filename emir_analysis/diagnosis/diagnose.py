@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.balances import BALANCES, FORCE, level
 from emir_analysis.diagnosis.candidates import (
     HOPELESS,
     Trial,
@@ -33,7 +33,6 @@ from emir_analysis.diagnosis.select import (
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.stick_slip import (
     DECIDED,
-    FORCE,
     VISCOUS,
     begun,
     fullest,

@@ -47,9 +47,10 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
     shaping, sizes = [paths.index(p) for p in SHAPES], [paths.index(p) for p in SIZES]
     others = [k for k in range(len(paths)) if k not in (*shaping, *sizes)]
     # how the others act depends little on the friction: found once
-    near = start.x + STEP * np.eye(start.x.size)[others]
-    values = missing(np.vstack([start.x, near]))
-    acting = (values[1:] - values[0]) / STEP
+    _, high = start.unknowns.bounds
+    steps = np.where(start.x + STEP > high, -STEP, STEP)
+    values = missing(np.vstack([start.x, start.x + np.diag(steps)[others]]))
+    acting = (values[1:] - values[0]) / steps[others, None]
     shapes = _grid(start)
     points = np.tile(start.x, (len(shapes), 1))
     points[:, shaping] = shapes

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
@@ -29,7 +29,6 @@ STEPS = tuple(float(s) for s in range(-24, 25) if s)
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
-FORCE = list(BALANCES).index("force")
 LOAD = "external_load"
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
@@ -38,7 +38,6 @@ ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest 
 Method = Callable[[Problem, float], Solution]
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
-FORCE = list(BALANCES).index("force")
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 
 

@@ -1,11 +1,13 @@
 """The friction of a machine that sticks and slips, from a beginning that grows."""
 
+import math
+
 import numpy as np
 import pytest
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
-from emir_analysis.diagnosis.friction_starts import friction_starts
+from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.stick_slip import DECIDED, FIRST, STARTS, begun, fullest, grown, nested
 from emir_plant.sheet import Sheet, joint1
 
@@ -48,6 +50,15 @@ def test_the_balances_say_how_much_friction_there_is_beside_its_shape() -> None:
         assert friction.force == pytest.approx(2e4, rel=0.15)
     shapes = {(f.breakaway, round(f.stribeck_speed, 5)) for f in leading}
     assert {(1.4, 5e-3), (1.7, 5e-3)} <= shapes
+
+
+def test_friction_is_begun_beside_an_effect_at_the_edge_of_its_range() -> None:
+    searched, sheet, evidence = search({})
+    air = trial(sheet, ("entrained_air",))
+    _, high = air.unknowns.bounds
+    edge = fullest(air.at(np.where(air.unknowns.toleranced, 0.0, high)), sheet)
+    found = friction_starts(edge, evidence, searched.floor, FIRST)
+    assert len(found) == math.prod(map(len, SHAPES.values()))
 
 
 def test_no_more_friction_stays_than_there_is() -> None:

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from emir_analysis.diagnosis.control import before_and_after
-from emir_analysis.diagnosis.diagnose import Progress, diagnose
+from emir_analysis.diagnosis.diagnose import diagnose
 from emir_analysis.diagnosis.experiment import open_experiment
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.model_file import write_model
 from emir_analysis.diagnosis.page import write_page
 from emir_analysis.diagnosis.predictions import check_folder, write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
+from emir_analysis.diagnosis.search import Progress
 from emir_analysis.errors import InputError
 from emir_analysis.signals import read_signal_map
 from emir_plant.sheet import load_sheet

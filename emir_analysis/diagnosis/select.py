@@ -12,6 +12,7 @@ SEEN = 2.0 / 3.0  # share of each recording, from its start, that the fits see b
 STRONG = 10.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
 SPEAKS = np.sqrt(2.0)  # times the floor: what is systematic is then larger than the noise
 CHANCE = 1e-3  # with which noise alone may make a balance of a short recording speak
+AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
 BLOCK = 1.0  # s: errors closer than this are not counted as independent
 
@@ -87,3 +88,17 @@ def quiet(left: Array, floor: Array, evidence: Evidence) -> bool:
 def explained(errors: list[Array]) -> bool:
     """Tell whether a free run explains its recordings: all signals together, in their noise."""
     return bool(np.sqrt(np.mean(np.concatenate(errors) ** 2)) <= EXPLAINED)
+
+
+def excess(tried: Trial, evidence: Evidence) -> float:
+    """Return the mean square of all signals' free-run errors beyond the noise, in its units.
+
+    Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
+    """
+    errors = np.concatenate(free_run_errors(tried.machine, evidence))
+    return float(np.mean(errors**2) - 1.0)
+
+
+def at_noise(tried: Trial, evidence: Evidence) -> bool:
+    """Tell whether all signals together are down to the noise."""
+    return excess(tried, evidence) <= AT_NOISE**2 - 1.0

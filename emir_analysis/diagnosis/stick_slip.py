@@ -13,10 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes, trial
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
+from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_force
 from emir_analysis.diagnosis.friction_starts import friction_starts
+from emir_analysis.diagnosis.select import STRONG, excess, free_run_score
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -36,49 +38,6 @@ ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
 ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
 
 Method = Callable[[Problem, float], Solution]
-
-COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
-DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
-
-
-def sticks(known: Trial) -> bool:
-    """Tell whether a trial has dry friction."""
-    return any(name in DRY for name in known.effects)
-
-
-def nested(full: Trial, less: Trial) -> bool:
-    """Tell whether one trial's friction is another's with a break-away of 1: Coulomb's."""
-    without = {COULOMB if name == STRIBECK else name for name in full.effects}
-    return full.effects != less.effects and without == set(less.effects)
-
-
-def fullest(known: Trial, sheet: Sheet) -> Trial:
-    """Return a trial with the friction that has all others in it but the load's.
-
-    The maker's parameters are as stated again: instants of sticking have led them astray.
-    """
-    for name in known.effects:
-        if name in {*DRY, VISCOUS}:
-            known = known.without(name)
-    known = known.at(np.where(known.unknowns.toleranced, 0.0, known.x))
-    return trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
-
-
-def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
-    """Return trials with less friction: without the viscous one, without a break-away."""
-    found = []
-    if VISCOUS in full.effects:
-        found.append(full.without(VISCOUS))
-    if STRIBECK in full.effects:
-        found.append(_without_breakaway(full, sheet))
-    return found
-
-
-def viscous_force(known: Trial, velocity: float) -> float:
-    """Return a trial's viscous friction, N, at a velocity, m/s; inf where it has none."""
-    if VISCOUS not in known.effects:
-        return np.inf
-    return known.machine.effects.viscous_friction.coefficient * velocity
 
 
 def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
@@ -115,6 +74,25 @@ def _distinct(fits: list[Solution]) -> list[Solution]:
     return found
 
 
+def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Array) -> Trial:
+    """Return a trial with as little friction as will do over the beginning up to DECIDED.
+
+    More has to take half of the rest away: a law that is a little off is mimicked by another.
+    And it has to be more than the force balance could tell from noise. floor: as for `begun`.
+    """
+    begin = evidence.until(DECIDED)
+    limit = free_run_score(known, begin, seen=0.0) + STRONG
+    _, velocity = evidence.signals()["piston_velocity"]
+    unheard = viscous_force(known, float(np.max(np.abs(velocity)))) < floor[FORCE]
+    for less in simpler(known, sheet):
+        fitted = _further(less, begin)
+        no_worse = free_run_score(fitted, begin, seen=0.0) < limit
+        no_worse |= unheard and VISCOUS not in less.effects
+        if no_worse or 0.5 * excess(fitted, begin) < excess(known, begin):
+            return with_less_friction(fitted, evidence, sheet, floor)
+    return known
+
+
 def grown(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole."""
     end = max(float(e.time[-1]) for e in evidence.experiments)
@@ -122,7 +100,7 @@ def grown(known: Trial, evidence: Evidence) -> Trial:
     return known.continued(_led(known, evidence, x, DECIDED, end, descended))
 
 
-def further(known: Trial, evidence: Evidence) -> Trial:
+def _further(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that is near the optimum."""
     return known.continued(_fitted(known, evidence, _at_rest(known, evidence), ROUGH))
 
@@ -174,13 +152,3 @@ def _fitted(
 ) -> Solution:
     problem = free_run_problem(known, evidence, x)
     return method(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
-
-
-def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:
-    values, others = full.unknowns.values(full.x), full.without(STRIBECK)
-    found = trial(sheet, (*others.effects, COULOMB), others)
-    x = found.x.copy()
-    for k, unknown in enumerate(found.unknowns.members):
-        if unknown.path.startswith(f"effects.{COULOMB}."):
-            x[k] = unknown.at(values[unknown.path.replace(COULOMB, STRIBECK)])
-    return found.at(x)

@@ -15,10 +15,11 @@ from emir_analysis.diagnosis.candidates import (
     fit_free_run,
     trial,
 )
-from emir_analysis.diagnosis.diagnose import Search, loudest
+from emir_analysis.diagnosis.diagnose import loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import STRONG, balance_score, speaks
 from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine

@@ -7,8 +7,9 @@ import pytest
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
+from emir_analysis.diagnosis.friction_laws import fullest, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
-from emir_analysis.diagnosis.stick_slip import DECIDED, FIRST, STARTS, begun, fullest, grown, nested
+from emir_analysis.diagnosis.stick_slip import FIRST, STARTS, begun, grown, with_less_friction
 from emir_plant.sheet import Sheet, joint1
 
 HIDDEN = {
@@ -28,9 +29,8 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     """Begun without any knowledge of the break-away, the fit ends at what was hidden."""
     searched, sheet, evidence = search(HIDDEN)
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
-    begin = evidence.until(DECIDED)
     law = begun(fullest(known, sheet), evidence, searched.floor)
-    assert searched.with_less_friction(law, begin) is law
+    assert with_less_friction(law, evidence, sheet, searched.floor) is law
     found = grown(law, evidence)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -65,7 +65,7 @@ def test_no_more_friction_stays_than_there_is() -> None:
     """A machine with Coulomb friction alone."""
     searched, sheet, evidence = search(SLIDING)
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
-    law = searched.with_less_friction(law, evidence.until(DECIDED))
+    law = with_less_friction(law, evidence, sheet, searched.floor)
     fitted = grown(law, evidence)
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))

@@ -1,0 +1,59 @@
+"""The laws of friction among the effects, from the fullest to the simplest."""
+
+import numpy as np
+
+from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_plant.sheet import Sheet
+
+COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
+DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
+
+
+def sticks(known: Trial) -> bool:
+    """Tell whether a trial has dry friction."""
+    return any(name in DRY for name in known.effects)
+
+
+def nested(full: Trial, less: Trial) -> bool:
+    """Tell whether one trial's friction is another's with a break-away of 1: Coulomb's."""
+    without = {COULOMB if name == STRIBECK else name for name in full.effects}
+    return full.effects != less.effects and without == set(less.effects)
+
+
+def fullest(known: Trial, sheet: Sheet) -> Trial:
+    """Return a trial with the friction that has all others in it but the load's.
+
+    The maker's parameters are as stated again: instants of sticking have led them astray.
+    """
+    for name in known.effects:
+        if name in {*DRY, VISCOUS}:
+            known = known.without(name)
+    known = known.at(np.where(known.unknowns.toleranced, 0.0, known.x))
+    return trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
+
+
+def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
+    """Return trials with less friction: without the viscous one, without a break-away."""
+    found = []
+    if VISCOUS in full.effects:
+        found.append(full.without(VISCOUS))
+    if STRIBECK in full.effects:
+        found.append(_without_breakaway(full, sheet))
+    return found
+
+
+def viscous_force(known: Trial, velocity: float) -> float:
+    """Return a trial's viscous friction, N, at a velocity, m/s; inf where it has none."""
+    if VISCOUS not in known.effects:
+        return np.inf
+    return known.machine.effects.viscous_friction.coefficient * velocity
+
+
+def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:
+    values, others = full.unknowns.values(full.x), full.without(STRIBECK)
+    found = trial(sheet, (*others.effects, COULOMB), others)
+    x = found.x.copy()
+    for k, unknown in enumerate(found.unknowns.members):
+        if unknown.path.startswith(f"effects.{COULOMB}."):
+            x[k] = unknown.at(values[unknown.path.replace(COULOMB, STRIBECK)])
+    return found.at(x)

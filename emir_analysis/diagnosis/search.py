@@ -1,0 +1,353 @@
+"""Which effects explain the recordings: what is tried, in which order, and what is kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from emir_analysis.diagnosis.balances import level
+from emir_analysis.diagnosis.candidates import (
+    HOPELESS,
+    Trial,
+    fit_balances,
+    fit_free_run,
+    free_run_errors,
+    refine_free_run,
+    trial,
+)
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import SHORTEST
+from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
+from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
+from emir_analysis.diagnosis.select import (
+    AT_NOISE,
+    EXPLAINED,
+    SEEN,
+    STRONG,
+    at_noise,
+    balance_score,
+    excess,
+    explained,
+    free_run_score,
+    quiet,
+    rivals,
+)
+from emir_analysis.diagnosis.stick_slip import begun, grown, with_less_friction
+from emir_plant.effects import REGISTRY
+from emir_plant.sheet import Sheet
+
+LEFT = 1.03  # the same of all signals together, from which on a further effect is looked for
+MOST_EFFECTS = 2  # that are looked for in one machine
+MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
+MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
+CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
+
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A trial and its scores on the balances and on the unseen free run; smaller is better.
+
+    free_run: None where the balances already spoke against it.
+    """
+
+    trial: Trial
+    balances: float
+    free_run: float | None = None
+
+
+class Search:
+    """Forward selection, then backward elimination.
+
+    Effects are added one at a time, as long as the unseen free run gets better; then those go
+    without which the whole is explained as well.
+
+    tried: all trials. balanced, refitted: the parameters alone, fitted to the balances and to the
+    free run of the whole recordings.
+    """
+
+    def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
+        self._evidence, self._sheet, self._progress = evidence, sheet, progress
+        self._head = evidence.head(SEEN)
+        self.floor = evidence.floor(sheet.machine)
+        progress("parameters only")
+        self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
+        self.refitted = fit_free_run(self.balanced, evidence)
+        self.tried: list[Tried] = []
+        self._whole: dict[tuple[str, ...], Trial] = {}
+        self._settled: tuple[str, ...] = ()  # effects that are known to be needed
+
+    def run(self) -> list[Trial]:
+        """Return the best trial and those that are as good."""
+        errors = free_run_errors(self.refitted.machine, self._evidence)
+        lacking = rms(np.concatenate(errors)) > AT_NOISE
+        if not np.any(lacking) and self._quiet(self.balanced):
+            self.tried = [self._scored(self.balanced)]
+            return [self.refitted]  # nothing is left that an effect could explain
+        plain = self._scored(
+            fit_balances(self.balanced, self._head, self.floor),
+            free_run_score(self.refitted, self._evidence),
+        )
+        best = plain
+        self.tried, equal, enough = [best], [best.trial], False
+        before: dict[tuple[str, ...], list[Trial]] = {(): equal}
+        while len(best.trial.effects) < MOST_EFFECTS:
+            self._progress(f"all effects beside: {best.trial.name}")
+            better = self._beside_enough(best) if enough else self._beside(best)
+            if not better:
+                break
+            equal = _as_good(better)
+            before[equal[0].effects] = equal
+            best = self._known_whole(next(t for t in better if t.trial is equal[0]))
+            if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
+                equal, best = self._by_beginning(equal, best)
+            enough = self._enough(best.trial)
+            if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
+                break
+        if not enough and np.any(self._evidence.fitted):
+            self._progress("pairs of effects")
+            better = self._by_balances(self._pairs(plain, best), best)
+            if better:
+                equal = _as_good(better)
+                pair = next(t for t in better if t.trial is equal[0])
+                if sticks(pair.trial):  # however far off: where it sticks drives it away
+                    equal, _ = self._by_beginning(equal, pair)
+        needed = self.needed(equal[0])
+        return equal if needed is equal[0] else before.get(needed.effects, [needed])
+
+    def whole(self, chosen: Trial) -> Trial:
+        """Return a trial fitted to the free run of the whole recordings."""
+        if chosen.effects not in self._whole:
+            self._progress(f"fitting to the whole recording: {chosen.name}")
+            fitted = refine_free_run(chosen, self._evidence)
+            if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
+                fitted = self._with_fewer_sizes(fitted)
+                fitted = fitted if sticks(fitted) else self._refined_again(fitted)
+            self._whole[chosen.effects] = fitted
+        return self._whole[chosen.effects]
+
+    def _refined_again(self, fitted: Trial) -> Trial:
+        """Return a trial fitted again from where it ended, as long as that helps much.
+
+        Where something switches, slopes lead only a little way at a time.
+        """
+        while self._excess(fitted) > LEFT**2 - 1.0:
+            again = refine_free_run(fitted, self._evidence)
+            if self._on_whole(again) > self._on_whole(fitted) - STRONG:
+                break
+            fitted = again
+        return fitted
+
+    def _with_fewer_sizes(self, full: Trial) -> Trial:
+        """Return a trial with one size of its effects alone where that is better than with all.
+
+        Beside another that explains nothing a size may not find its way.
+        """
+        best = full
+        for effect in full.effects:
+            sizes = REGISTRY[effect].sizes
+            if len(sizes) > 1:
+                alone = min((best.with_one_size(effect, s) for s in sizes), key=self._on_whole)
+                best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
+        return best
+
+    def needed(self, chosen: Trial) -> Trial:
+        """Return a trial without the effect that is least needed, if one is not."""
+        if not chosen.effects or not self._enough(self.whole(chosen)):
+            return chosen
+        least = self._on_whole(self.whole(chosen)) + STRONG
+        for effect in chosen.effects:
+            if effect in self._settled:
+                continue
+            fewer = self.whole(chosen).without(effect)
+            if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
+                continue
+            self._progress(f"fitting without: {effect}")
+            fitted = refine_free_run(fewer, self._evidence)
+            known = self._whole.get(fewer.effects, fitted)
+            fitted = min(fitted, known, key=self._on_whole)
+            if self._on_whole(fitted) < least and self._enough(fitted):
+                self._whole[fewer.effects] = fitted
+                return self.needed(fitted)
+        return chosen
+
+    def _on_whole(self, fitted: Trial) -> float:
+        return free_run_score(fitted, self._evidence, seen=0.0)
+
+    def _known_whole(self, best: Tried) -> Tried:
+        """Return a trial as the whole recordings have it, if it is near them.
+
+        What the part that the fits see tells badly, such as how a drift goes on, is then no
+        reason to look for another effect. What sticks and leaves much even there is not led to
+        the optimum so.
+        """
+        if sticks(best.trial) and not at_noise(best.trial, self._head):
+            return best
+        near = self._excess(best.trial) < HOPELESS**2
+        return replace(best, trial=self.whole(best.trial)) if near else best
+
+    def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
+        """Return the best trials, one that sticks, with the friction that a beginning tells.
+
+        The same where that is no better on the whole, or where they leave nothing.
+        """
+        if self._excess(best.trial) <= LEFT**2 - 1.0:
+            return equal, best
+        self._progress(f"friction by a growing beginning: {best.trial.name}")
+        start = fullest(best.trial, self._sheet)
+        law = begun(start, self._evidence, self.floor)
+        law = with_less_friction(law, self._evidence, self._sheet, self.floor)
+        if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
+            return equal, best
+        found = grown(law, self._evidence)
+        if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
+            return equal, best
+        self._whole[found.effects] = found
+        self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
+        told = self._scored(found, free_run_score(found, self._evidence))
+        self.tried.append(told)
+        return [found], told
+
+    def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
+        """Return pairs of effects, the most promising first.
+
+        All to first order, and all beside the one effect that says most to the balances: the
+        free run may be none the better for it while another effect drives it away.
+        """
+        found = screen_pairs(plain.trial, self._sheet, self._head, self.floor)
+        singles = [t for t in self.tried if len(t.trial.effects) == 1]
+        first = min(singles, key=lambda t: t.balances, default=best)
+        if first.trial.effects != best.trial.effects:
+            found += screen(first.trial, self._sheet, self._head, self.floor)
+        return sorted(found, key=lambda s: s.cost)
+
+    def _beside(self, best: Tried) -> list[Tried]:
+        """Return what is better with one effect more.
+
+        Where missing sensors leave balances out, what those would show is in the free run alone:
+        that is asked too where the others lead nowhere near, and where they are quiet: what acts
+        in a few windows only hardly shows in them.
+        """
+        better = []
+        if np.any(self._evidence.fitted):
+            found = screen(best.trial, self._sheet, self._head, self.floor)
+            better = self._by_balances(found, best)
+            near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
+            complete = np.all(self._evidence.told) and (better or not self._quiet(best.trial))
+            if near or complete:
+                return better
+        return better + self._better(self._on_free_run(best), best)
+
+    def _beside_enough(self, best: Tried) -> list[Tried]:
+        """Return the same beside a trial that is good enough: what takes away most of the rest.
+
+        The balances are quiet then; the free run alone may know more.
+        """
+        least = 0.5 * self._excess(best.trial)
+        better = self._better(self._on_free_run(best), best)
+        close = min(map(_free, better), default=0.0) + STRONG
+        return [t for t in better if _free(t) < close and self._excess(self.whole(t.trial)) < least]
+
+    def _on_free_run(self, best: Tried) -> list[Tried]:
+        """Return the trials with one effect more that promise most on the free run.
+
+        Where it has long gone astray no first-order step says anything.
+        """
+        near = self._head.until(_astray(best.trial, self._head) + SHORTEST)
+        found = screen_free_run(best.trial, self._sheet, near)
+        return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
+
+    def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
+        """Fit trials to the balances, those that come close to the best of them to the free run.
+
+        Return what is better. Where none is, the one that is ahead in the free run already.
+        """
+        known = {frozenset(tried.trial.effects) for tried in self.tried}
+        new = []
+        for screened in found:
+            if frozenset(screened.trial.effects) not in known:
+                known.add(frozenset(screened.trial.effects))
+                new.append(screened.trial)
+        round_ = []
+        for trial_ in new[:MOST_FITTED]:
+            self._progress(f"balances: {trial_.name}")
+            round_.append(self._scored(fit_balances(trial_, self._head, self.floor)))
+        least = min((t.balances for t in round_), default=np.inf)
+        limit = min(best.balances - STRONG, least + CLOSE)
+        close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
+        promising = close[:MOST_SIMULATED]
+        others = [t for t in round_ if t not in promising]
+        better = self._better(promising, best)
+        if not better:
+            ahead = self._ahead(others, best)
+            others = [t for t in others if t not in ahead]
+            better = self._better(ahead, best)
+        self.tried += others
+        return better
+
+    def _ahead(self, others: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial whose free run is best, if it is better than the best so far.
+
+        Though it is fitted to the balances alone: a free run adds up what they hardly know of,
+        such as a small leak.
+        """
+        least, ahead = _free(best) - STRONG, []
+        for tried in others:
+            score = free_run_score(tried.trial, self._evidence)
+            if score < least:
+                least, ahead = score, [tried]
+        return ahead
+
+    def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
+        """Fit trials to the free run; return those that are better than the best so far."""
+        simulated = []
+        for tried in promising:
+            self._progress(f"free run: {tried.trial.name}")
+            fitted = fit_free_run(tried.trial, self._head)
+            simulated.append(Tried(fitted, tried.balances, free_run_score(fitted, self._evidence)))
+        self.tried += simulated
+        return [t for t in simulated if _free(t) < _free(best) - STRONG]
+
+    def _enough(self, tried: Trial) -> bool:
+        """Tell whether a trial leaves no balance speaking and explains the free run."""
+        return self._quiet(tried) and explained(free_run_errors(tried.machine, self._evidence))
+
+    def _quiet(self, tried: Trial) -> bool:
+        left = level(self._evidence.residuals([tried.machine])[0])
+        return quiet(left, self._evidence.floor(tried.machine), self._evidence)
+
+    def _excess(self, tried: Trial) -> float:
+        return excess(tried, self._evidence)
+
+    def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
+        return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
+
+
+def _astray(tried: Trial, evidence: Evidence) -> float:
+    """Return until when, s, the free run of any recording stays near the machine."""
+    near = []
+    for experiment, errors in zip(
+        evidence.experiments, free_run_errors(tried.machine, evidence), strict=True
+    ):
+        so_far = np.cumsum(np.mean(errors**2, axis=1)) / np.arange(1, len(errors) + 1)
+        near.append(experiment.period * np.count_nonzero(so_far <= HOPELESS**2))
+    return float(max(near))
+
+
+def _as_good(better: list[Tried]) -> list[Trial]:
+    """Return the best trial and those that are as good.
+
+    Of two of which one is the other without a break-away the one with fewer parameters: it would
+    be as good whatever the recordings are.
+    """
+    equal = rivals([t.trial for t in better], [_free(t) for t in better])
+    best = next((less for less in equal[1:] if nested(equal[0], less)), equal[0])
+    others = [t for t in equal[1:] if t is not best and t.x.size <= best.x.size]
+    return [best, *others]
+
+
+def _free(tried: Tried) -> float:
+    return float("inf") if tried.free_run is None else tried.free_run

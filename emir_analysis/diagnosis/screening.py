@@ -2,7 +2,8 @@
 
 Near a fitted trial its parameters move the balances along straight lines. With that Jacobian,
 found once, they are eliminated (variable projection, Golub and Pereyra 1973), and of each effect
-only its own few fields remain to be fitted: cheap enough for every effect of the registry.
+only its own few fields remain to be fitted: cheap enough for every effect of the registry. Where
+those are fitted, the parameters stay inside their tolerances.
 """
 
 from collections.abc import Callable
@@ -11,11 +12,12 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
+from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, likely, of_force, of_steps
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
@@ -52,10 +54,11 @@ class _Left:
     def __init__(self, known: Trial, missing: Missing, step: float) -> None:
         self.step_size = step
         self._missing = missing
-        held = known.unknowns.toleranced
-        prior = np.diag(np.where(held, 1.0, 0.0)) / TOLERANCE_SPREAD
-        self._drawn = np.where(held, known.x, 0.0) / TOLERANCE_SPREAD
-        _, high = known.unknowns.bounds
+        stated = known.unknowns.toleranced
+        prior = np.diag(np.where(stated, 1.0 / TOLERANCE_SPREAD, HELD))
+        self._drawn = np.where(stated, known.x, 0.0) / TOLERANCE_SPREAD
+        low, high = known.unknowns.bounds
+        self._x, self._room = known.x, (low - known.x, high - known.x)
         steps = np.where(known.x + step > high, -step, step)
         values = missing([known, *(known.at(x) for x in known.x + np.diag(steps))])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
@@ -66,11 +69,12 @@ class _Left:
         residual = self._augmented(trials)
         return np.asarray(residual - (residual @ self._basis) @ self._basis.T)
 
-    def step(self, final: Trial) -> Array:
-        """Return the known parameters' best change, (k,), beside an effect."""
-        residual = self._augmented([final])[0]
-        step = np.linalg.lstsq(self._triangle, self._basis.T @ residual, rcond=1e-9)[0]
-        return np.asarray(-step)
+    def inside(self, trials: list[Trial]) -> tuple[Array, Array]:
+        """Return the same, (m, n), and the known x, (m, k), with x inside its bounds."""
+        residuals = self._augmented(trials)
+        wanted = np.nan_to_num(-residuals @ self._basis)
+        changes = np.array([lsq_linear(self._triangle, row, self._room).x for row in wanted])
+        return residuals + changes @ self._triangle.T @ self._basis.T, self._x + changes
 
     def _augmented(self, trials: list[Trial]) -> Array:
         drawn = np.tile(self._drawn, (len(trials), 1))
@@ -100,11 +104,11 @@ class _Candidate:
     def fitted(self) -> Screened:
         """Fit the effects' fields, from where they are best or from where they ought to be."""
         points = np.array([self.x, self._reached])
-        begin = points[int(np.argmin([_soft(row) for row in self._model(points)]))]
+        begin = points[int(np.argmin([_soft(row) for row in self._inside(points)]))]
         nothing_held = np.zeros(self.x.size, dtype=bool)
-        problem = Problem(self._model, begin, *self.bounds, nothing_held)
+        problem = Problem(self._inside, begin, *self.bounds, nothing_held)
         own = fit(problem, ACCURACY, robust=True).x if np.isfinite(self.expected) else self.x
-        return Screened(self._with_parameters(own), _soft(self._model(own[None])[0]))
+        return Screened(self._with_parameters(own), _soft(self._inside(own[None])[0]))
 
     def stepped(self, missing: Missing) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
@@ -128,16 +132,19 @@ class _Candidate:
         return np.array([False] * self._known + sizes)
 
     def _with_parameters(self, own: Array) -> Trial:
-        """Return the trial with fields, (k,), and the known parameters' best change."""
-        known = self._start.x[: self._known]
-        final = self._start.at(np.append(known, own))
-        low, high = (bound[: self._known] for bound in self._start.unknowns.bounds)
-        moved = np.clip(known + self._left.step(final), low, high)
-        return self._start.at(np.append(moved, own))
+        """Return the trial with fields, (k,), and the known parameters where they do their best."""
+        known = self._left.inside(self._trials(own[None]))[1][0]
+        return self._start.at(np.append(known, own))
 
     def _model(self, points: Array) -> Array:
+        return self._left(self._trials(points))
+
+    def _inside(self, points: Array) -> Array:
+        return self._left.inside(self._trials(points))[0]
+
+    def _trials(self, points: Array) -> list[Trial]:
         known = self._start.x[: self._known]
-        return self._left([self._start.at(np.append(known, x)) for x in points])
+        return [self._start.at(np.append(known, x)) for x in points]
 
 
 def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:

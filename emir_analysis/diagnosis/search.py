@@ -221,7 +221,8 @@ class Search:
         singles = [t for t in self.tried if len(t.trial.effects) == 1]
         first = min(singles, key=lambda t: t.balances, default=best)
         if first.trial.effects != best.trial.effects:
-            found += screen(first.trial, self._sheet, self._head, self.floor)
+            told = fit_balances(first.trial, self._head, self.floor)
+            found += screen(told, self._sheet, self._head, self.floor)
         return sorted(found, key=lambda s: s.cost)
 
     def _beside(self, best: Tried) -> list[Tried]:

@@ -12,7 +12,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.screening import screen
+from emir_analysis.diagnosis.screening import screen, screen_pairs
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -84,6 +84,23 @@ def test_one_of_several_sizes_is_seen_where_another_hides_it(off: float) -> None
     first = screen(plain, sheet, evidence, floor)[0].trial
     assert first.name == "logic_block_fault"
     assert first.machine.effects.logic_block_fault.threshold == pytest.approx(off, rel=0.05)
+
+
+def test_an_effect_is_not_promised_parameters_beyond_their_tolerances() -> None:
+    """Air alone would explain softer hoses too, if the cylinders were larger than they can be."""
+    stated = joint1()
+    soft = {
+        "effects.entrained_air.share": 0.013,
+        "effects.vessel_compliance.lifting": 2.25e-11,
+    }
+    evidence = Evidence([recorded_run(with_values(stated, soft))], stated)
+    floor = evidence.floor(stated)
+    tolerances = {"cylinder.beta": 0.15, "cylinder.volume_lifting_0": 0.1}
+    sheet = Sheet(stated, tolerances, {}, ())
+    plain = fit_balances(trial(sheet, ()), evidence, floor)
+    assert screen(plain, sheet, evidence, floor)[0].trial.name == "vessel_compliance"
+    first = screen_pairs(plain, sheet, evidence, floor)[0].trial
+    assert set(first.effects) == {"entrained_air", "vessel_compliance"}
 
 
 def test_what_the_residuals_do_not_depend_on_stays_unknown() -> None:

@@ -35,6 +35,11 @@ class Judged:
         pairs = zip(self.runs[stage], self.evidence.experiments, strict=True)
         return [run - experiment.outputs for run, experiment in pairs]
 
+    def off(self, stage: str) -> float:
+        """Return the RMS error of all signals together, in units of the sensors' noise."""
+        errors = np.concatenate(self.errors(stage)) / self.evidence.sensors
+        return float(np.sqrt(np.mean(errors[:, self.evidence.shown] ** 2)))
+
 
 def machines(findings: Findings) -> dict[str, Machine]:
     """Return the machine of each stage; without an effect named, the last is the re-fitted one."""

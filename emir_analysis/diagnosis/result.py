@@ -12,9 +12,11 @@ from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians, rms
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
+from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statistics import (
     Interval,
@@ -113,7 +115,8 @@ class ErrorTests:
 class Diagnosis:
     """What a recording's machine lacks in the model, and the error before and after.
 
-    verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words. rivals:
+    verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words. Where
+    nothing is missing in the recordings but something in the judge, it is unexplained. rivals:
     what would do as well where ambiguous. tell_apart: a movement that would tell them apart.
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
@@ -149,8 +152,8 @@ def diagnosis(
     whole = {stage: np.concatenate(judged.errors(stage)) for stage in stages}
     fitted = _parameters(findings.chosen)
     return Diagnosis(
-        verdict=findings.verdict,
-        statement=_statement(findings),
+        verdict=_verdict(findings, judged),
+        statement=_statement(findings) + _judgement(findings, judged),
         effects=_effects(findings, fitted),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
         tell_apart=_tell_apart(findings),
@@ -164,8 +167,8 @@ def diagnosis(
         shape=findings.shape,
         untold=untold(findings.evidence),
         control=control or {},
-        recording=", ".join(e.name for e in findings.evidence.experiments),
-        judged_on=", ".join(e.name for e in judged.evidence.experiments),
+        recording=_names(findings.evidence),
+        judged_on=_names(judged.evidence),
     )
 
 
@@ -234,6 +237,28 @@ def _statement(findings: Findings) -> str:
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
     return names + (f"; {remainder}" if remainder else "")
+
+
+def _surprised(judged: Judged) -> bool:
+    """Tell whether the judge recordings show what the model does not explain."""
+    return not judged.off(STAGES[-1]) <= EXPLAINED
+
+
+def _verdict(findings: Findings, judged: Judged) -> str:
+    if findings.verdict == "nothing_missing" and _surprised(judged):
+        return "unexplained"
+    return findings.verdict
+
+
+def _judgement(findings: Findings, judged: Judged) -> str:
+    if findings.verdict == "unexplained" or not _surprised(judged):
+        return ""
+    off, judge = judged.off(STAGES[-1]), _names(judged.evidence)
+    return f"; but {judge}, {off:.1f} times the noise off, shows more: diagnose from that too"
+
+
+def _names(evidence: Evidence) -> str:
+    return ", ".join(experiment.name for experiment in evidence.experiments)
 
 
 def _described(shape: Shape) -> str:

@@ -140,6 +140,24 @@ def test_an_effect_outside_the_registry_is_called_unexplained(
     assert quiet.after < 1.5 * quiet.noise
 
 
+def test_what_the_judge_recording_alone_shows_is_not_called_nothing(
+    folder: Path, built: Machine, tmp_path: Path
+) -> None:
+    """The operator goes to a tight spot only after the recording to learn from."""
+
+    def tight_spot(stroke: float, velocity: float) -> float:
+        return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
+
+    recorded.record_machine(tmp_path / "a", built, DURATION, seed=3)
+    recorded.record_machine(tmp_path / "b", built, DURATION, 4, tight_spot)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
+    assert result.verdict == "unexplained", summary(result)
+    assert result.effects == ()
+    assert f"{tmp_path / 'b'}, " in result.statement
+    page = (tmp_path / "a.html").read_text()
+    assert "no known effect explains" in page
+
+
 def test_a_sheet_without_tolerances_is_taken_at_its_word(folder: Path, tmp_path: Path) -> None:
     exact = re.sub(r".*{tol: .*\n|, tol: [0-9.]+", "", recorded.DATA_SHEET)
     (tmp_path / "datasheet.yaml").write_text(exact)

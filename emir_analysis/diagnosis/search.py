@@ -148,9 +148,8 @@ class Search:
         """
         best = full
         for effect in full.effects:
-            sizes = REGISTRY[effect].sizes
-            if len(sizes) > 1:
-                alone = min((best.with_one_size(effect, s) for s in sizes), key=self._on_whole)
+            alone = min(_with_one_size(best, effect), key=self._on_whole, default=None)
+            if alone is not None:
                 best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
         return best
 
@@ -303,12 +302,20 @@ class Search:
         return ahead
 
     def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
-        """Fit trials to the free run; return those that are better than the best so far."""
+        """Fit trials to the free run; return those that are better than the best so far.
+
+        Of several sizes of an effect one alone is taken where the others are not worth their while.
+        """
         simulated = []
         for tried in promising:
             self._progress(f"free run: {tried.trial.name}")
-            fitted = fit_free_run(tried.trial, self._head)
-            simulated.append(Tried(fitted, tried.balances, free_run_score(fitted, self._evidence)))
+            full = fit_free_run(tried.trial, self._head)
+            ways = [full]
+            for effect in full.effects:
+                ways += _with_one_size(full, effect)
+            scores = [free_run_score(way, self._evidence) for way in ways]
+            best_way = int(np.argmin(scores))
+            simulated.append(Tried(ways[best_way], tried.balances, scores[best_way]))
         self.tried += simulated
         return [t for t in simulated if _free(t) < _free(best) - STRONG]
 
@@ -325,6 +332,13 @@ class Search:
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
+
+
+def _with_one_size(full: Trial, effect: str) -> list[Trial]:
+    """Return a trial with each size of an effect alone, if it has several."""
+    paths = [unknown.path for unknown in full.unknowns.members]
+    sizes = [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
+    return [full.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
 
 
 def _astray(tried: Trial, evidence: Evidence) -> float:

@@ -30,7 +30,8 @@ SAME = 1.001  # ratio of the errors of two fits up to which they are the same mi
 GROWTH = 1.5  # of a beginning from one to the next
 LEAP = 3.0  # the same where the free run follows the machine until then
 FOLLOWS = 1.05  # times the error so far: the most over a longer beginning that it follows
-DRAWN = 3000.0  # s, simulated of machines drawn from what a beginning leaves open
+DRAWN = 3000.0  # s, simulated of machines drawn from what a beginning leaves open ...
+DRAWN_OF_EACH = 500.0  # s, the same of each of the best while several are led
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
@@ -59,9 +60,11 @@ def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
         if min(each.misfit for each in fits) <= 1.0:
             break
     for count in LED:
-        time *= GROWTH
-        points = [found.x for found in _distinct(fits)[:count]]
-        fits = [_fitted(start, evidence.until(time), x, ROUGH) for x in points]
+        longer = GROWTH * time
+        best = _distinct(fits)[:count]
+        points = [_next(start, evidence, each, time, longer, DRAWN_OF_EACH)[1] for each in best]
+        fits = [_fitted(start, evidence.until(longer), x, ROUGH) for x in points]
+        time = longer
     return start.continued(_led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit))
 
 
@@ -116,16 +119,16 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     """Fit to beginnings that grow from a time to another, s."""
     fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY, method)
     while time < end:
-        time, x = _next(known, evidence, fitted, time, end)
+        time, x = _next(known, evidence, fitted, time, end, DRAWN)
         accuracy = ON_THE_WAY if time < end else ACCURACY
         fitted = _fitted(known, evidence.until(time), x, accuracy, method)
     return fitted
 
 
-def _next(
-    known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float
+def _next(  # noqa: PLR0913, PLR0917 (as _led)
+    known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float, seconds: float
 ) -> tuple[float, Array]:
-    """Return the next beginning's end, s, and from where it is fitted.
+    """Return the next beginning's end, s, and from where it is fitted; seconds: to be drawn.
 
     As long as the instants of sticking are the machine's, a fit goes on from what it knows. Where
     they are not, it would not find back to them: of machines drawn from what the beginning leaves
@@ -136,7 +139,7 @@ def _next(
         longer = min(growth * time, end)
         if _errors(known, evidence.until(longer), fitted.x[None])[0] < limit:
             return longer, fitted.x
-    drawn = np.vstack([fitted.x, fitted.drawn(int(DRAWN / longer))])
+    drawn = np.vstack([fitted.x, fitted.drawn(int(seconds / longer))])
     return longer, drawn[int(np.argmin(_errors(known, evidence.until(longer), drawn)))]
 
 

@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_force
 from emir_analysis.diagnosis.friction_starts import friction_starts
-from emir_analysis.diagnosis.select import STRONG, excess, free_run_score
+from emir_analysis.diagnosis.select import BLOCK, STRONG, score
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -81,19 +81,29 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
     """Return a trial with as little friction as will do over the beginning up to DECIDED.
 
     More has to take half of the rest away: a law that is a little off is mimicked by another.
-    And it has to be more than the force balance could tell from noise. floor: as for `begun`.
+    And it has to be more than the force balance could tell from noise. What is left out is held
+    against all friction together: without the part before, a fit may not have found its way.
+    floor: as for `begun`.
     """
     begin = evidence.until(DECIDED)
-    limit = free_run_score(known, begin, seen=0.0) + STRONG
+    _, misfit = _further(known, begin)
+    limit = _score(misfit, known, begin) + STRONG
     _, velocity = evidence.signals()["piston_velocity"]
     unheard = viscous_force(known, float(np.max(np.abs(velocity)))) < floor[FORCE]
-    for less in simpler(known, sheet):
-        fitted = _further(less, begin)
-        no_worse = free_run_score(fitted, begin, seen=0.0) < limit
-        no_worse |= unheard and VISCOUS not in less.effects
-        if no_worse or 0.5 * excess(fitted, begin) < excess(known, begin):
-            return with_less_friction(fitted, evidence, sheet, floor)
+    fewer = simpler(known, sheet)
+    while fewer:
+        fitted, left = _further(fewer.pop(0), begin)
+        no_worse = _score(left, fitted, begin) < limit
+        no_worse |= unheard and VISCOUS in known.effects and VISCOUS not in fitted.effects
+        if no_worse or 0.5 * (left**2 - 1.0) < misfit**2 - 1.0:
+            known, fewer = fitted, simpler(fitted, sheet)
     return known
+
+
+def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
+    """Return the criterion of `select` for a fit whose state at rest was fitted along."""
+    channels = np.full(np.count_nonzero(evidence.shown), misfit**2)
+    return score(channels, evidence.duration(1.0) / BLOCK, fitted.x.size)
 
 
 def grown(known: Trial, evidence: Evidence) -> Trial:
@@ -103,9 +113,10 @@ def grown(known: Trial, evidence: Evidence) -> Trial:
     return known.continued(_led(known, evidence, x, DECIDED, end, descended))
 
 
-def _further(known: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial that is near the optimum."""
-    return known.continued(_fitted(known, evidence, _at_rest(known, evidence), ROUGH))
+def _further(known: Trial, evidence: Evidence) -> tuple[Trial, float]:
+    """Fit a trial that is near the optimum; return it and its RMS error in units of the noise."""
+    fitted = _fitted(known, evidence, _at_rest(known, evidence), ROUGH)
+    return known.continued(fitted), fitted.misfit
 
 
 def _at_rest(known: Trial, evidence: Evidence) -> Array:

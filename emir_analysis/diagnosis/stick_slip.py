@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_force
 from emir_analysis.diagnosis.friction_starts import friction_starts
-from emir_analysis.diagnosis.select import BLOCK, STRONG, score
+from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, STRONG, score
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -31,7 +31,7 @@ GROWTH = 1.5  # of a beginning from one to the next
 LEAP = 3.0  # the same where the free run follows the machine until then
 FOLLOWS = 1.05  # times the error so far: the most over a longer beginning that it follows
 DRAWN = 3000.0  # s, simulated of machines drawn from what a beginning leaves open ...
-DRAWN_OF_EACH = 500.0  # s, the same of each of the best while several are led
+DRAWN_OF_EACH = 500.0  # s, the same of each while several are led, or where the law is off
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-4  # relative, of the free run's squared error
@@ -130,7 +130,9 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     """Fit to beginnings that grow from a time to another, s."""
     fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY, method)
     while time < end:
-        time, x = _next(known, evidence, fitted, time, end, DRAWN)
+        # where even what is fitted is not at the noise, the law is off, not one stick
+        seconds = DRAWN if fitted.misfit <= AT_NOISE else DRAWN_OF_EACH
+        time, x = _next(known, evidence, fitted, time, end, seconds)
         accuracy = ON_THE_WAY if time < end else ACCURACY
         fitted = _fitted(known, evidence.until(time), x, accuracy, method)
     return fitted

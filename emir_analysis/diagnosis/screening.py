@@ -72,7 +72,7 @@ class _Left:
     def inside(self, trials: list[Trial]) -> tuple[Array, Array]:
         """Return the same, (m, n), and the known x, (m, k), with x inside its bounds."""
         residuals = self._augmented(trials)
-        wanted = np.nan_to_num(-residuals @ self._basis)
+        wanted = np.nan_to_num(-residuals @ self._basis, posinf=0.0, neginf=0.0)
         changes = np.array([lsq_linear(self._triangle, row, self._room).x for row in wanted])
         return residuals + changes @ self._triangle.T @ self._basis.T, self._x + changes
 

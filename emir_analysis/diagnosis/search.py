@@ -44,7 +44,6 @@ MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free
 PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
-
 Progress = Callable[[str], None]
 
 
@@ -84,8 +83,8 @@ class Search:
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
         errors = free_run_errors(self.refitted.machine, self._evidence)
-        lacking = rms(np.concatenate(errors)) > AT_NOISE
-        if not np.any(lacking) and self._quiet(self.balanced):
+        within = rms(np.concatenate(errors)) <= AT_NOISE  # not where there is no free run: NaN
+        if np.all(within) and self._quiet(self.balanced):
             self.tried = [self._scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
         plain = self._scored(

@@ -68,10 +68,15 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Stated:
-    """What the maker says. tolerances: relative, by name, of those that have one."""
+    """What the maker says.
+
+    tolerances: relative, by name, of those that have one. missing: signals of the signal map for
+    which the machine has no sensor.
+    """
 
     numbers: Numbers
     tolerances: dict[str, float]
+    missing: tuple[str, ...] = ()
 
     def built(self, random: np.random.Generator) -> Numbers:
         """Return a machine somewhere within the tolerances."""

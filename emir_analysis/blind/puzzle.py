@@ -9,7 +9,7 @@ from emir_analysis.blind.hidden import CATALOGUE, Hidden, Random
 from emir_analysis.blind.machine import Array, Machine, Sizes
 from emir_analysis.blind.numbers import Numbers, Stated
 from emir_analysis.blind.operator import Operator
-from emir_analysis.blind.recording import Run, Start, operated, repeated, spread_of_strokes
+from emir_analysis.blind.recording import SEEN_IN, Run, Start, operated, repeated, spread_of_strokes
 
 Effects = tuple[type[Hidden], ...]
 
@@ -130,19 +130,23 @@ def _large_enough(
         operator = _operator(np.random.default_rng(seed), stated, abrupt=True)
         with_it = operated(effect(numbers, sizes), start, operator, PROBE)
         without = repeated(Machine(numbers), start, with_it.commands)
-        made = difference(with_it, without)
+        made = difference(with_it, without, stated.missing)
         if made >= MATTERS:
             return sizes, made
         sizes = {n: v * STRONGER if n in effect.grows else v for n, v in sizes.items()}
     return None, 0.0
 
 
-def difference(one: Run, other: Run) -> float:
-    """Return the RMS between runs, as a share of the standard deviation, in the worst signal."""
+def difference(one: Run, other: Run, missing: tuple[str, ...]) -> float:
+    """Return the RMS between runs, as a share of the standard deviation, in the worst signal.
+
+    missing: signals of the signal map for which there is no sensor; what shows there alone shows
+    nowhere.
+    """
 
     def share(name: str) -> float:
         a: Array = one.shown[name]
         b: Array = other.shown[name]
         return float(np.sqrt(np.mean((a - b) ** 2)) / b.std())
 
-    return max(share(name) for name in one.shown)
+    return max(share(name) for name in one.shown if SEEN_IN[name] - set(missing))

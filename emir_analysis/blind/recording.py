@@ -14,6 +14,12 @@ from emir_analysis.blind.operator import RANGE, Operator
 Command = Callable[[float, Array], float]  # time, s, and state -> y2
 
 START = 1_700_000_000_000_000_000  # ns
+SEEN_IN = {  # signals of the signal map in which one of a run is seen
+    "angle": {"joint_angle", "piston_stroke"},
+    "pressure_lifting": {"pressure_lifting"},
+    "pressure_lowering": {"pressure_lowering"},
+    "deflection": {"tip_deflection_angle"},
+}
 _HEADER = """\
 std_msgs/Header header
 {fields}

@@ -24,7 +24,7 @@ from emir_analysis.blind.numbers import (
 )
 from emir_analysis.blind.puzzle import Puzzle, kind_of, puzzle
 from emir_analysis.blind.recording import write
-from emir_analysis.blind.varied import missing_sensors, varied
+from emir_analysis.blind.varied import varied
 from emir_analysis.errors import InputError
 
 PATIENCE = 3600.0  # s, for one diagnosis
@@ -99,9 +99,9 @@ def trial(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Ou
 
 def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
     foreign = foreign_effects(plan.foreign)
-    stated, missing = _machine(plan, number)
+    stated = _stated(plan, number)
     (folder / SHEET).write_text(data_sheet(stated), encoding="utf-8")
-    (folder / SIGNALS).write_text(signal_map(missing), encoding="utf-8")
+    (folder / SIGNALS).write_text(signal_map(stated.missing), encoding="utf-8")
     try:
         made = puzzle(stated, plan.seed, number, foreign, plan.duration, plan.only)
     except NotSolvedError as error:
@@ -114,13 +114,12 @@ def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
     return _outcome(made, number, answer, failure, time.monotonic() - begin)
 
 
-def _machine(plan: Plan, number: int) -> tuple[Stated, tuple[str, ...]]:
-    """Return what the maker says of a machine and which sensors it does without."""
+def _stated(plan: Plan, number: int) -> Stated:
+    """Return what the maker says of a machine."""
     stated = read_numbers(DATA_SHEET)
     if not plan.varied:
-        return stated, ()
-    random = np.random.default_rng((plan.seed, number, 2))
-    return varied(stated, random), missing_sensors(random)
+        return stated
+    return varied(stated, np.random.default_rng((plan.seed, number, 2)))
 
 
 def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:

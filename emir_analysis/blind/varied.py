@@ -32,12 +32,8 @@ def varied(stated: Stated, random: Random) -> Stated:
     n = _other_hydraulics(n, random)
     n = _other_sensors(n, random)
     strict = random.uniform(0.5, 1.5)
-    return Stated(n, {name: strict * tol for name, tol in stated.tolerances.items()})
-
-
-def missing_sensors(random: Random) -> tuple[str, ...]:
-    """Return which sensors a machine does without."""
-    return MISSING[random.integers(len(MISSING))]
+    tolerances = {name: strict * tol for name, tol in stated.tolerances.items()}
+    return Stated(n, tolerances, MISSING[random.integers(len(MISSING))])
 
 
 def _resized(n: Numbers, random: Random) -> Numbers:

@@ -1,6 +1,7 @@
 """The result of a diagnosis as values, as JSON and as lines of text."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -254,7 +255,8 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.verdict == "unexplained" or not _surprised(judged):
         return ""
     off, judge = judged.off(STAGES[-1]), _names(judged.evidence)
-    return f"; but {judge}, {off:.1f} times the noise off, shows more: diagnose from that too"
+    by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
+    return f"; but {judge}, {by}, shows more: diagnose from that too"
 
 
 def _names(evidence: Evidence) -> str:

@@ -18,7 +18,8 @@ from emir_analysis.blind.numbers import (
     read_numbers,
     signal_map,
 )
-from emir_analysis.blind.puzzle import KINDS, MATTERS, hidden_in, puzzle
+from emir_analysis.blind.puzzle import KINDS, MATTERS, difference, hidden_in, puzzle
+from emir_analysis.blind.recording import SEEN_IN, Run
 from emir_analysis.blind.report import report
 from emir_analysis.blind.trial import Outcome, Plan, foreign_effects
 from emir_analysis.blind.varied import varied
@@ -100,6 +101,17 @@ def test_a_varied_machine_is_another_one_that_works_as_well(
         sheet = load_sheet(tmp_path / "sheet.yaml", strict=True)
         assert sheet.machine.geometry.boom_length == n.boom_length
         assert sheet.tolerances["cylinder.beta"] == stated.tolerances["beta"]
+
+
+def test_what_no_sensor_shows_does_not_matter() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    shown = dict.fromkeys(SEEN_IN, time)
+    plain = Run(np.zeros(3), shown)
+    bent = Run(plain.commands, shown | {"deflection": time + 1.0})
+    assert difference(bent, plain, ("pressure_lowering",)) > MATTERS
+    assert difference(bent, plain, ("tip_deflection_angle",)) == 0.0
+    turned = Run(plain.commands, shown | {"angle": time + 1.0})
+    assert difference(turned, plain, ("joint_angle",)) > MATTERS  # the stroke shows it
 
 
 def test_a_smaller_machine_has_a_smaller_load_hidden_in_it() -> None:

@@ -39,9 +39,7 @@ DELAY_LINE = 13  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
-FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging: the phase that
-# Runge-Kutta loses in it adds up over seconds and shifts the instants of sticking
-SWING = 2e-4  # m/s, amplitude of the piston in that mode from which on they are taken
+FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging
 
 
 class Truth(NamedTuple):
@@ -309,16 +307,16 @@ def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
         turning += p.mode_joint[i] * dx[MODES + n + i]
         admittance += p.mode_joint[i] * p.mode_joint[i]
     friction = terms.dry_friction(motion.joint_velocity, motion.force, p)
-    fine = usual / FINER if usual <= STEP else usual
-    dry = dry_friction.over_step(
+    piston = dry_friction.Piston(
         motion.joint_velocity,
         motion.arm * turning,
         motion.arm * motion.arm * admittance,
         motion.force,
-        min(left, fine if _swing(x, dx, motion.arm, friction, p) > SWING else usual),
-        fine,
-        p,
+        friction,
+        _swing(x, dx, motion.arm, friction, p),
     )
+    fine = usual / FINER if usual <= STEP else usual
+    dry = dry_friction.over_step(piston, left, usual, fine, p)
     for i in range(n):
         dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry.force
     return dry

@@ -12,6 +12,7 @@ and how often it does so decides where it stands afterwards. Steps are therefore
 the change of friction does to the velocity is small.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from emir_plant.effects import terms
@@ -20,8 +21,22 @@ from emir_plant.jit import compiled
 SHORTEST = 0.125  # of the fine step
 CHANGE = 0.12  # m/s^2, of the velocity by the change of friction, per fine step: 3e-5 m/s
 GENTLE = 0.5  # share of the change of velocity, below which a step of Runge-Kutta is accurate
-ITERATIONS = 60  # of the search; it takes about ten, sliding two
-TOLERANCE = 1e-12  # m/s
+SWING = 2e-4  # m/s, amplitude of the piston in the fastest mode from which on steps are shorter:
+# the phase that is lost in it adds up over seconds and shifts the instants of sticking
+EVEN = 2.0  # fine steps where the friction stays the same all over that swing
+ITERATIONS = 60  # of the search; it takes about six, sliding one
+TOLERANCE = 1e-9  # m/s
+
+
+class Piston(NamedTuple):
+    """The piston at the start of a step."""
+
+    velocity: float  # m/s
+    acceleration: float  # without dry friction, m/s^2
+    mobility: float  # 1/kg
+    load: float  # force of the oil, N
+    friction: float  # dry, N
+    swing: float  # amplitude in the boom's fastest mode, m/s
 
 
 class Friction(NamedTuple):
@@ -36,32 +51,36 @@ class Friction(NamedTuple):
 
 
 @compiled
-def over_step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
-    velocity: float,
-    acceleration: float,
-    mobility: float,
-    load: float,
-    longest: float,
-    fine: float,
-    p: Any,
-) -> Friction:
-    """Return the dry friction of the longest step that is accurate, up to `longest`, s.
+def over_step(piston: Piston, left: float, usual: float, fine: float, p: Any) -> Friction:
+    """Return the dry friction of the longest step that is accurate.
 
-    velocity: m/s. acceleration: without dry friction, m/s^2. mobility: of the piston, 1/kg.
-    load: force of the oil on the piston, N. fine: step, s, to which the accuracy belongs.
+    left: the most it may be, s. usual: step without dry friction, s. fine: step, s, that follows
+    stick and slip, and to which the accuracy belongs.
     """
-    before = terms.dry_friction(velocity, load, p)
-    step = longest
+    step = min(left, _following(piston, usual, fine, p))
     while True:
-        after = at_end(velocity + step * acceleration, step * mobility, load, p)
-        change = step * mobility * abs(after - before)
-        moved = step * abs(acceleration - mobility * after)
+        end = piston.velocity + step * piston.acceleration
+        after = at_end(end, step * piston.mobility, piston.load, p)
+        change = step * piston.mobility * abs(after - piston.friction)
+        moved = step * abs(piston.acceleration - piston.mobility * after)
+        gentle = change <= GENTLE * moved or change == 0.0
+        if gentle:
+            return Friction(step, piston.friction, False)
         if change <= CHANGE * fine or step <= SHORTEST * fine:
-            break
+            return Friction(step, after, True)
         step *= 0.5
-    if change <= GENTLE * moved or change == 0.0:
-        return Friction(step, before, False)
-    return Friction(step, after, True)
+
+
+@compiled
+def _following(piston: Piston, usual: float, fine: float, p: Any) -> float:
+    """Return the longest step, s, that follows the piston's swing."""
+    if piston.swing <= SWING:
+        return usual
+    slowest = piston.velocity - math.copysign(piston.swing, piston.velocity)
+    change = terms.dry_friction(slowest, piston.load, p) - piston.friction
+    if piston.mobility * abs(change) > CHANGE:
+        return fine
+    return min(EVEN * fine, usual)
 
 
 @compiled
@@ -69,28 +88,17 @@ def at_end(unhindered: float, mobility: float, load: float, p: Any) -> float:
     """Return the dry friction, N, at the end of a step.
 
     unhindered: velocity at the end of the step without it, m/s. mobility: step over mass,
-    m/(s N). load: force of the oil on the piston, N.
+    m/(s N). load: force of the oil on the piston, N. The velocity is looked for between 0 and
+    unhindered by the Illinois method, first where the friction of sliding unhindered leads.
     """
-    sliding = terms.dry_friction(unhindered, load, p)
-    if sliding == 0.0:
+    low, at_low = 0.0, -unhindered
+    high, at_high = unhindered, mobility * terms.dry_friction(unhindered, load, p)
+    if at_high == 0.0:
         return 0.0
-    end = unhindered - mobility * sliding
-    if end * unhindered > 0.0:
-        friction = terms.dry_friction(end, load, p)
-        if abs(mobility * (friction - sliding)) <= TOLERANCE:
-            return friction
-    return (unhindered - _end_velocity(unhindered, mobility, load, p)) / mobility
-
-
-@compiled
-def _end_velocity(unhindered: float, mobility: float, load: float, p: Any) -> float:
-    """Return the velocity between 0 and unhindered, m/s, by the Illinois method."""
-    low, high = 0.0, unhindered
-    at_low = -unhindered
-    at_high = mobility * terms.dry_friction(unhindered, load, p)
-    velocity, side = low, 0
+    velocity, side = unhindered - at_high, 0
+    if velocity * unhindered <= 0.0:
+        velocity = _between(low, at_low, high, at_high)
     for _ in range(ITERATIONS):
-        velocity = (low * at_high - high * at_low) / (at_high - at_low)
         missing = velocity + mobility * terms.dry_friction(velocity, load, p) - unhindered
         if abs(missing) <= TOLERANCE:
             break
@@ -104,4 +112,11 @@ def _end_velocity(unhindered: float, mobility: float, load: float, p: Any) -> fl
             if side == -1:
                 at_high *= 0.5
             side = -1
-    return velocity
+        velocity = _between(low, at_low, high, at_high)
+    return (unhindered - velocity) / mobility
+
+
+@compiled
+def _between(low: float, at_low: float, high: float, at_high: float) -> float:
+    """Return where the line through two points is zero."""
+    return (low * at_high - high * at_low) / (at_high - at_low)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from emir_common.parameter_tree import with_values
 from emir_plant import core, dry_friction
 from emir_plant.core import Truth
+from emir_plant.effects import terms
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
@@ -29,7 +31,7 @@ def test_friction_of_a_step_belongs_to_the_velocity_at_its_end(unhindered: float
     p, mobility = _with_friction(2e4, 1e-4).record[0], 2e-7
     friction = dry_friction.at_end(unhindered, mobility, 6e5, p)
     end = unhindered - mobility * friction
-    assert friction == pytest.approx(2e4 * math.tanh(end / 1e-4), rel=1e-6)
+    assert abs(mobility * (friction - 2e4 * math.tanh(end / 1e-4))) <= 1e-9  # m/s
     assert end * unhindered >= 0.0  # it stops a motion, it does not turn it round
 
 
@@ -89,18 +91,42 @@ def test_stick_and_slip_that_keeps_up_a_bending_mode_agrees_with_a_stiff_solver(
     assert np.sqrt(np.mean(difference**2)) < 0.1 * np.std(late)
 
 
+def _piston(
+    p: Any, velocity: float, acceleration: float, weight: float, swing: float = 0.0
+) -> dry_friction.Piston:
+    """Return a piston under 600 kN; weight: 1/kg, swing: m/s."""
+    friction = terms.dry_friction(velocity, 6e5, p)
+    return dry_friction.Piston(velocity, acceleration, weight, 6e5, friction, swing)
+
+
 def test_a_step_is_short_only_where_friction_turns_round() -> None:
     p, longest = _with_friction(2e4, 1e-4).record[0], 1e-3
     weight = 1e-4  # 1/kg, of the piston
-    sliding = dry_friction.over_step(0.02, 1.0, weight, 6e5, longest, longest, p)
-    creeping = 1e-4 * math.atanh(0.5)
-    stuck = dry_friction.over_step(creeping, 1.0, weight, 6e5, longest, longest, p)
-    turning = dry_friction.over_step(-1e-4, 5.0, weight, 6e5, longest, longest, p)
-    assert sliding == (longest, pytest.approx(2e4), False)
+
+    def over_step(velocity: float, acceleration: float) -> dry_friction.Friction:
+        piston = _piston(p, velocity, acceleration, weight)
+        return dry_friction.over_step(piston, longest, longest, longest, p)
+
+    assert over_step(0.02, 1.0) == (longest, pytest.approx(2e4), False)  # sliding
+    stuck = over_step(1e-4 * math.atanh(0.5), 1.0)  # creeping
     assert stuck == (longest, pytest.approx(1.0 / weight, rel=1e-3), True)  # it holds the load
-    assert turning.step <= dry_friction.SHORTEST * longest
+    assert over_step(-1e-4, 5.0).step <= dry_friction.SHORTEST * longest
+
+
+def test_a_swing_is_followed_finely_only_where_it_reaches_standstill() -> None:
+    p, usual, fine, swing = _with_friction(2e4, 1e-4).record[0], 1e-3, 2.5e-4, 5e-3
+
+    def step(velocity: float, swing: float) -> float:
+        piston = _piston(p, velocity, 0.1, 1e-4, swing)
+        return dry_friction.over_step(piston, usual, usual, fine, p).step
+
+    assert step(0.02, 0.0) == usual
+    assert fine < step(0.02, swing) < usual
+    assert step(0.02, 4.0 * swing) <= fine
+    assert step(-0.02, 4.0 * swing) <= fine
 
 
 def test_without_friction_nothing_changes() -> None:
     p = Plant(joint1()).record[0]
-    assert dry_friction.over_step(0.01, 20.0, 1e-4, 6e5, 1e-3, 1e-3, p) == (1e-3, 0.0, False)
+    piston = _piston(p, 0.01, 20.0, 1e-4)
+    assert dry_friction.over_step(piston, 1e-3, 1e-3, 1e-3, p) == (1e-3, 0.0, False)

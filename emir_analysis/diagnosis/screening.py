@@ -212,7 +212,7 @@ def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) ->
     """Return loads at the TCP by what they would change in the free run."""
     loaded = trial(sheet, (*known.effects, LOAD), known)
     members = loaded.unknowns.members[known.x.size :]
-    size = SMALL * REGISTRY[LOAD].trial["force"]
+    size = SMALL * members[0].value(members[0].start)  # of the force
     begin = np.arange(0.0, float(evidence.experiments[0].time[-1]), LOAD_STEP)
     steps = [_fields(members, Load(size, 0.0, 0.0, float(t), FOR_EVER)) for t in begin]
     nothing = left([known])[0]

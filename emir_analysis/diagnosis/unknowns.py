@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.diagnosis.proportions import proportion
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
@@ -95,7 +96,7 @@ def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
     stated = groups(sheet.machine)
     members = [_toleranced(stated, path, tol) for path, tol in sheet.tolerances.items()]
     for effect in effects:
-        members += _of_effect(effect)
+        members += _of_effect(effect, sheet.machine)
     return Unknowns(sheet.machine, tuple(members))
 
 
@@ -106,12 +107,14 @@ def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Un
     return Unknown(path, unit, value, abs(value) * tolerance, -1.0, 1.0, 0.0, toleranced=True)
 
 
-def _of_effect(effect: str) -> list[Unknown]:
+def _of_effect(effect: str, machine: Machine) -> list[Unknown]:
     kind = REGISTRY[effect]
     stated = kind()
     members = []
     for name, about in quantities(kind).items():
         value = float(kind.trial.get(name, getattr(stated, name)))
+        if name in kind.sizes:
+            value = min(value * proportion(about.unit, machine), about.high)
         path = f"effects.{effect}.{name}"
         if about.low > 0.0 and about.high / about.low > WIDE:
             low = math.log(about.low / value) + ROUNDING

@@ -14,7 +14,7 @@ class Effect:
     sizes: names of the fields that are all 0 while the effect is off; each of them alone
         switches it on.
     source: where the term and its magnitude come from.
-    trial: values at which a search for a missing effect starts, SI units.
+    trial: values at which a search for a missing effect starts in EMIR's main joint, SI units.
     stepwise: names of the sizes that act only beyond some value, and too much soon after: a search
         goes through them in steps of their trial values.
     """

@@ -19,7 +19,7 @@ class SupplyPressureDroop(Effect):
     )
     trial: ClassVar[dict[str, float]] = {"resistance": 1e9}
 
-    resistance: float = quantity("Pa s/m^3", 0.0, 1e11, "R", default=0.0)
+    resistance: float = quantity("Pa s/m^3", 0.0, 1e13, "R", default=0.0)
     time_constant: float = quantity("s", 5e-3, 10.0, "T", default=0.2)
 
 

@@ -14,8 +14,11 @@ STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
 LEAST_STEP = 1e-5  # relative, of the change: not met because steps that lead nowhere were cut
-DESCENTS = 8  # steps of a descent at most
+DESCENTS = 12  # steps of a descent at most
 DAMPINGS = np.geomspace(1.0, 1e-8, 5)  # of its steps, in units of the largest curvature
+REACH = 10.0  # standard deviations of a principal axis, over which a descent takes slopes ...
+LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
+FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
 
@@ -99,30 +102,30 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
 def descended(problem: Problem, accuracy: float) -> Solution:
     """Minimise the squared residuals as `fit` does, where they are rough.
 
-    No trust region can be learned there from the last step. Levenberg and Marquardt's steps with
-    several dampings are simulated together, on all cores, and the best one is taken, as long as
+    A step along one parameter alone makes them far larger than several together that make up for
+    each other, and what sticks does so at other instants: slopes say nothing over it. They are
+    taken along the principal axes of what is known so far, over some standard deviations of each.
+    No trust region can be learned from the last step: Levenberg and Marquardt's steps with
+    several dampings are simulated together, on all cores, and the best point is taken, as long as
     it takes away more of the cost than the accuracy.
     """
-    low, high = problem.low, problem.high
-    x = np.clip(problem.start, low, high)
+    x = np.clip(problem.start, problem.low, problem.high)
     held = _Held(replace(problem, coarse=None), x)
+    residuals, slopes = held.slopes(x)
+    cost = float(np.mean(np.square(residuals)))
+    if not math.isfinite(cost):
+        return Solution(x, np.full((x.size, x.size), np.inf), math.inf)
     for _ in range(DESCENTS):
-        residuals, slopes = held.slopes(x)
-        cost = float(np.mean(np.square(residuals)))
-        if not math.isfinite(cost):
-            return Solution(x, np.full((x.size, x.size), np.inf), math.inf)
-        left, sizes, right = np.linalg.svd(slopes, full_matrices=False)
-        damped = sizes / (sizes**2 + DAMPINGS[:, None] * sizes[0] ** 2)
-        tried = np.clip(x - (damped * (left.T @ residuals)) @ right, low, high)
-        costs = np.mean(np.square(held.residuals(tried)), axis=1)
-        costs = np.where(np.isfinite(costs), costs, np.inf)
-        best = int(np.argmin(costs))
+        neighbours, slopes = held.slopes_along(x, residuals, slopes)
+        tried = np.vstack([neighbours, held.steps(x, residuals, slopes)])
+        left = held.residuals(tried)
+        costs = np.nan_to_num(np.mean(np.square(left), axis=1), nan=np.inf)
+        best, before = int(np.argmin(costs)), cost
         if costs[best] < cost:
-            x = tried[best]
-        if costs[best] > (1.0 - accuracy) * cost:
+            x, residuals, cost = tried[best], left[best], float(costs[best])
+        if costs[best] > (1.0 - accuracy) * before:
             break
-    misfit = math.sqrt(min(cost, float(costs[best])))
-    return Solution(x, held.covariance(slopes, residuals), misfit)
+    return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost))
 
 
 class _Held:
@@ -152,12 +155,44 @@ class _Held:
         residuals = np.append(values[0], self._weight * (x - self._expected))
         return residuals, np.vstack([slopes, np.diag(self._weight)])
 
+    def slopes_along(self, x: Array, residuals: Array, slopes: Array) -> tuple[Array, Array]:
+        """Return the slopes, (n + k, k), at x along the principal axes of former ones.
+
+        residuals: (n + k,), at x. And the best of the points, (1, k), that were simulated for it.
+        Where a step leads far off, the former slopes stay.
+        """
+        problem = self._problem
+        _, sizes, axes = np.linalg.svd(slopes, full_matrices=False)
+        longest = LONGEST / np.max(np.abs(axes), axis=1)
+        steps = np.minimum(REACH / sizes, longest)[:, None] * axes
+        outside = np.any((x + steps < problem.low) | (x + steps > problem.high), axis=1)
+        points = np.clip(x + np.where(outside[:, None], -steps, steps), problem.low, problem.high)
+        values = self.residuals(points)
+        costs = np.nan_to_num(np.mean(np.square(values), axis=1), nan=np.inf)
+        near = costs <= FAR * np.mean(np.square(residuals))
+        moved = points[near] - x
+        unforeseen = values[near] - residuals - moved @ slopes.T
+        change = np.linalg.lstsq(moved, unforeseen, rcond=1e-9)[0].T
+        best = points[[int(np.argmin(costs))]]
+        return best, slopes + np.where(_told(slopes), change, 0.0)
+
+    def steps(self, x: Array, residuals: Array, slopes: Array) -> Array:
+        """Return where steps with several dampings lead, (m, k)."""
+        left, sizes, right = np.linalg.svd(slopes, full_matrices=False)
+        damped = sizes / (sizes**2 + DAMPINGS[:, None] * sizes[0] ** 2)
+        ends = x - (damped * (left.T @ residuals)) @ right
+        return np.asarray(np.clip(ends, self._problem.low, self._problem.high))
+
     def covariance(self, slopes: Array, residuals: Array) -> Array:
         """Return the covariance, (k, k), from slopes, (n + k, k), and residuals, (n + k,)."""
         inverse = np.linalg.pinv(slopes.T @ slopes)
         # misfit beyond the noise widens the spread: the noise is not all that the model leaves
         covariance = inverse * max(1.0, float(np.mean(np.square(residuals))))
-        told = np.any(slopes[: -len(slopes.T)], axis=0) | self._problem.stated
-        untold = np.flatnonzero(~told)
+        untold = np.flatnonzero(~(_told(slopes) | self._problem.stated))
         covariance[untold, untold] = np.inf
         return np.asarray(covariance, dtype=np.float64)
+
+
+def _told(slopes: Array) -> NDArray[np.bool_]:
+    """Tell on which parameters the data depend, (k,), by the slopes of `_Held`, (n + k, k)."""
+    return np.asarray(np.any(slopes[: -len(slopes.T)], axis=0))

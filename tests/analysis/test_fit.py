@@ -87,3 +87,34 @@ def test_a_descent_from_where_nothing_can_be_simulated_says_so() -> None:
     one = np.ones(1)
     problem = Problem(model, 0.0 * one, -one, one, np.zeros(1, dtype=bool))
     assert descended(problem, 1e-3).misfit == np.inf
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_descent_follows_a_narrow_valley_with_steep_and_rough_walls(seed: int) -> None:
+    """A step along one number leaves the valley: residuals there are off by a fifth at random.
+
+    So do the residuals of a piston that sticks at other instants. At the optimum the squares are
+    fewer than at the truth by about as many as there are numbers (chi-square).
+    """
+    count, random = 2000, np.random.default_rng(seed)
+    sizes = np.logspace(4.0, 0.5, SIZE)  # what a step of one along each axis does
+    axes = np.linalg.qr(random.normal(size=(SIZE, SIZE)))[0]
+    true = 0.3 * random.normal(size=SIZE)
+    directions = random.normal(size=(count, SIZE)) / np.sqrt(count)
+    noise, phase = random.normal(size=count), random.uniform(0.0, 2.0 * np.pi, size=count)
+    deviations = np.where(np.arange(SIZE) < SIZE // 2, 1.0, 10.0)  # off by the most uncertain
+    start = true + axes @ np.clip(deviations / sizes * random.normal(size=SIZE), -0.5, 0.5)
+
+    def model(points: Array) -> Array:
+        z = ((points - true) @ axes * sizes) @ directions.T * np.sqrt(count)
+        rough = np.where(np.abs(z) > 10.0, 0.2 * z * np.sin(2.0 * z + phase), 0.0)
+        return np.asarray((z + rough) / np.sqrt(count) + noise)
+
+    def excess(x: Array) -> float:
+        return float(np.sum(model(x[None]) ** 2) - np.sum(noise**2))
+
+    bound = np.full(SIZE, 5.0)
+    free = np.zeros(SIZE, dtype=bool)
+    found = descended(Problem(model, start, -bound, bound, free, step=3e-3), 1e-4)
+    assert excess(start) > 50.0
+    assert excess(found.x) < 0.0

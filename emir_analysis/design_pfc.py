@@ -142,7 +142,7 @@ def scheduled(
             row.insert(0, found or row[0])
         models.append(tuple(row))
     p = Plant(machine).record[0]
-    strokes = np.array([linkage.stroke(angle, p) for angle in angles])
+    strokes = linkage.strokes(np.asarray(angles), p)
     forces = np.array([[_static_force(machine, a, load) for a in angles] for load in payloads])
     schedule = Schedule(strokes, np.array(payloads), forces, tuple(models))
     return replace(design_pfc(machine, task), schedule=schedule)

@@ -258,16 +258,13 @@ def _step(  # noqa: PLR0913, PLR0917 (as _advance)
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
     dry = _write_first_rates(x, command, left, usual, p, k1)
     h = dry.step
-    _write_sum(x, 0.5 * h, k1, p, between)
+    write_sum(x, 0.5 * h, k1, p, between)
     _write_later_rates(between, command, dry, p, k2)
-    _write_sum(x, 0.5 * h, k2, p, between)
+    write_sum(x, 0.5 * h, k2, p, between)
     _write_later_rates(between, command, dry, p, k3)
-    _write_sum(x, h, k3, p, between)
+    write_sum(x, h, k3, p, between)
     _write_later_rates(between, command, dry, p, k4)
-    for i in range(DELAY_LINE):
-        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-    for i in range(MODES, MODES + 2 * p.mode_joint.size):
-        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    advance_by(x, h, work, p)
     x[P_H] = max(x[P_H], 0.0)
     x[P_S] = max(x[P_S], 0.0)
     remember(x, p)
@@ -284,12 +281,22 @@ def remember(x: Array, p: Any) -> None:
 
 
 @compiled
-def _write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
+def write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
     """Write x + h rates to result, but for the delay line: `command_delay` alone works on it."""
     for i in range(DELAY_LINE):
         result[i] = x[i] + h * rates[i]
     for i in range(MODES, MODES + 2 * p.mode_joint.size):
         result[i] = x[i] + h * rates[i]
+
+
+@compiled
+def advance_by(x: Array, h: float, stages: Array, p: Any) -> None:
+    """Advance x in place by a step h, s, of Runge-Kutta 4 with the rates of its stages, (4+, n)."""
+    k1, k2, k3, k4 = stages[0], stages[1], stages[2], stages[3]
+    for i in range(DELAY_LINE):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    for i in range(MODES, MODES + 2 * p.mode_joint.size):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
 @compiled

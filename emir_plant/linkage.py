@@ -7,7 +7,12 @@ up; the joint torque is F r with r = dh/dalpha > 0. Paper equation (1), with its
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from emir_plant.jit import compiled, square_root
+
+Array = NDArray[np.float64]
 
 
 @compiled
@@ -41,6 +46,24 @@ def angle(stroke: float, p: Any) -> float:
     a, b = p.triangle_a, p.triangle_b
     length = p.length_stretched + stroke
     return math.acos((a * a + b * b - length * length) / (2.0 * a * b)) - p.triangle_gamma0
+
+
+@compiled
+def strokes(angles: Array, p: Any) -> Array:
+    """Return the piston strokes, (n,) m, at boom angles, (n,) rad."""
+    found = np.empty(angles.size)
+    for k in range(angles.size):
+        found[k] = stroke(angles[k], p)
+    return found
+
+
+@compiled
+def lever_arms(angles: Array, p: Any) -> Array:
+    """Return the lever arms dh/dalpha, (n,) m, at boom angles, (n,) rad."""
+    found = np.empty(angles.size)
+    for k in range(angles.size):
+        found[k] = lever_arm(angles[k], p)
+    return found
 
 
 def reach(p: Any) -> tuple[float, float]:

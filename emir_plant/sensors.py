@@ -117,7 +117,7 @@ def readings(plant: Plant, truth: Array, period: float) -> Readings:
     }
     lifting, lowering = shown["pressure_lifting"], shown["pressure_lowering"]
     return Readings(
-        stroke=_strokes(shown["angle"], plant.record),
+        stroke=linkage.strokes(shown["angle"], plant.record[0]),
         force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
         **shown,
     )
@@ -150,11 +150,3 @@ def _lagged(signal: Array, lag: float, period: float) -> Array:
 @compiled
 def _stroke(angle: float, parameters: NDArray[Any]) -> float:
     return linkage.stroke(angle, parameters[0])
-
-
-@compiled
-def _strokes(angles: Array, parameters: NDArray[Any]) -> Array:
-    result = np.empty_like(angles)
-    for k in range(angles.size):
-        result[k] = _stroke(angles[k], parameters)
-    return result

@@ -88,8 +88,8 @@ class Balances:
         slopes = [_smoothed(column, LAG_SMOOTHING, period)[1] for column in shown.T]
         self._slopes = np.column_stack([self._rate, *slopes])
         p = Plant(geometry).record[0]
-        arm = np.array([linkage.lever_arm(a, p) for a in self._smooth_angle])
-        stroke = np.array([linkage.stroke(a, p) for a in experiment.angle])
+        arm = linkage.lever_arms(self._smooth_angle, p)
+        stroke = linkage.strokes(experiment.angle, p)
         self._off_linkage = experiment.outputs[:, 0] - stroke
         self._flow_per_rate = np.column_stack(
             [
@@ -306,7 +306,5 @@ def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0
     )
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
-    shown = np.column_stack(
-        [np.array([linkage.stroke(a, p) for a in angle]), ideal[:, 2:] + noise * scale]
-    )
+    shown = np.column_stack([linkage.strokes(angle, p), ideal[:, 2:] + noise * scale])
     return experiment.showing(angle, shown)

@@ -175,7 +175,7 @@ def _angles(stroke: Array, machine: Machine) -> Array:
 def _strokes(angle: Array, machine: Machine) -> Array:
     """Return the strokes, (n,) m, at boom angles, (n,) rad."""
     p = record(machine)[0]
-    return np.array([linkage.stroke(a, p) for a in angle])
+    return np.asarray(linkage.strokes(angle, p))
 
 
 def noise(machine: Machine) -> Array:

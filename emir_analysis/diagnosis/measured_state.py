@@ -35,14 +35,11 @@ class Modelled(NamedTuple):
 
 
 @compiled
-def _write_rates(
-    x: Array, command: float, measured: Array, parameters: NDArray[Any], dx: Array
-) -> None:
+def _write_rates(x: Array, command: float, measured: Array, p: Any, dx: Array) -> None:
     """Put the measured values into the state x and write its rates to dx.
 
     measured: (5,) p_H, p_S, Pa, boom angle, rad, its rate, rad/s, and one that is not used here.
     """
-    p = parameters[0]
     n = p.mode_joint.size
     x[core.P_H], x[core.P_S] = measured[0], measured[1]
     bent, bending = 0.0, 0.0
@@ -51,28 +48,24 @@ def _write_rates(
         bending += p.mode_joint[i] * x[core.MODES + n + i]
     x[core.MODES] = (measured[2] - bent) / p.mode_joint[0]
     x[core.MODES + n] = (measured[3] - bending) / p.mode_joint[0]
-    core.write_derivative(x, command, parameters, dx)
+    core.write_derivative_of(x, command, p, dx)
 
 
 @compiled
 def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
-    x: Array, command: float, dt: float, measured: Array, parameters: NDArray[Any], work: Array
+    x: Array, command: float, dt: float, measured: Array, p: Any, work: Array
 ) -> None:
     """Advance x by dt, s, with RK4. measured: (3, 5) at start, middle and end of the step."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
-    _write_rates(x, command, measured[0], parameters, k1)
-    for i in range(x.size):
-        between[i] = x[i] + 0.5 * dt * k1[i]
-    _write_rates(between, command, measured[1], parameters, k2)
-    for i in range(x.size):
-        between[i] = x[i] + 0.5 * dt * k2[i]
-    _write_rates(between, command, measured[1], parameters, k3)
-    for i in range(x.size):
-        between[i] = x[i] + dt * k3[i]
-    _write_rates(between, command, measured[2], parameters, k4)
-    for i in range(x.size):
-        x[i] += dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-    core.remember(x, parameters[0])
+    _write_rates(x, command, measured[0], p, k1)
+    core.write_sum(x, 0.5 * dt, k1, p, between)
+    _write_rates(between, command, measured[1], p, k2)
+    core.write_sum(x, 0.5 * dt, k2, p, between)
+    _write_rates(between, command, measured[1], p, k3)
+    core.write_sum(x, dt, k3, p, between)
+    _write_rates(between, command, measured[2], p, k4)
+    core.advance_by(x, dt, work, p)
+    core.remember(x, p)
 
 
 @compiled
@@ -117,12 +110,13 @@ def _follow(
             result[4, k] += (p.mode_tip_angle[i] - p.mode_joint[i]) * bent
         if k == samples - 1:
             break
-        slope = (measured[k + 1] - measured[k]) / every
         for j in range(every):
-            at[0] = measured[k] + slope * j
-            at[1] = at[0] + 0.5 * slope
-            at[2] = at[0] + slope
-            _step(x, arriving[k * every + j], dt, at, parameters, work)
+            for i in range(measured.shape[1]):
+                slope = (measured[k + 1, i] - measured[k, i]) / every
+                at[0, i] = measured[k, i] + slope * j
+                at[1, i] = at[0, i] + 0.5 * slope
+                at[2, i] = at[0, i] + slope
+            _step(x, arriving[k * every + j], dt, at, p, work)
             left_out = (measured[k + 1, 4] - measured[k, 4]) / every - dt * at[1, 3]
             swept_lifting, swept_lowering = _swept(left_out, at[1], p)
             lifting += swept_lifting

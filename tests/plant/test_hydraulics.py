@@ -108,10 +108,11 @@ def test_steady_lifting_speed_is_the_nominal_flow_over_the_area() -> None:
 
 
 def test_lever_arm_is_the_derivative_of_the_stroke() -> None:
-    for angle in np.radians(np.linspace(-10, 90, 21)):
-        step = 1e-5
-        slope = linkage.stroke(angle + step, P) - linkage.stroke(angle - step, P)
-        assert linkage.lever_arm(angle, P) == pytest.approx(slope / (2 * step), rel=1e-8)
+    angles, step = np.radians(np.linspace(-10, 90, 21)), 1e-5
+    slopes = (linkage.strokes(angles + step, P) - linkage.strokes(angles - step, P)) / (2 * step)
+    assert linkage.lever_arms(angles, P) == pytest.approx(slopes, rel=1e-8)
+    for angle, slope in zip(angles, slopes, strict=True):
+        assert linkage.lever_arm(angle, P) == pytest.approx(slope, rel=1e-8)
         assert linkage.angle(linkage.stroke(angle, P), P) == pytest.approx(angle, abs=1e-12)
     assert linkage.stroke(0.0, P) == 0.0
 

@@ -14,11 +14,13 @@ STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
 LEAST_STEP = 1e-5  # relative, of the change: not met because steps that lead nowhere were cut
-DESCENTS = 12  # steps of a descent at most
+DESCENTS = 20  # steps of a descent at most
 DAMPINGS = np.geomspace(1.0, 1e-8, 5)  # of its steps, in units of the largest curvature
 REACH = 10.0  # standard deviations of a principal axis, over which a descent takes slopes ...
 LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
 FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
+TOLD = 1.0 + 1e-6  # times the curvature of what holds a parameter: more and the data tell of it
+KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
 
 
@@ -30,7 +32,8 @@ class Problem:
     stated: (k,) true for parameters that a maker states: they are held to their stated value as
     weakly as their tolerance says, so that what the data cannot tell stays where it is.
     coarse: a cheaper model with the same slopes, from which the Jacobian is taken. step: of its
-    finite differences.
+    finite differences. curvature: (k, k) of a fit to a part of the data, if there was one: a
+    descent takes its first slopes along its principal axes.
     """
 
     model: Callable[[Array], Array]
@@ -40,18 +43,21 @@ class Problem:
     stated: NDArray[np.bool_]
     coarse: Callable[[Array], Array] | None = None
     step: float = STEP
+    curvature: Array | None = None
 
 
 @dataclass(frozen=True)
 class Solution:
     """x: (k,). covariance: (k, k) from the curvature at the optimum. misfit: RMS residual.
 
-    The variance of what the residuals do not depend on is infinite.
+    The variance of what the residuals do not depend on is infinite. curvature: (k, k), half the
+    second derivatives of the squared residuals.
     """
 
     x: Array
     covariance: Array
     misfit: float
+    curvature: Array
 
     def drawn(self, count: int) -> Array:
         """Return vectors, (count, k), drawn from the normal distribution; what is untold stays.
@@ -92,10 +98,12 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         ftol=accuracy,
         max_nfev=EVALUATIONS,
     )
+    slopes = np.asarray(result.jac)
     return Solution(
         np.clip(start + result.x, low, high),
-        held.covariance(np.asarray(result.jac), result.fun),
+        held.covariance(slopes, result.fun),
         math.sqrt(2.0 * result.cost / result.fun.size),
+        slopes.T @ slopes,
     )
 
 
@@ -107,25 +115,43 @@ def descended(problem: Problem, accuracy: float) -> Solution:
     taken along the principal axes of what is known so far, over some standard deviations of each.
     No trust region can be learned from the last step: Levenberg and Marquardt's steps with
     several dampings are simulated together, on all cores, and the best point is taken, as long as
-    it takes away more of the cost than the accuracy.
+    it takes away more of the cost than the accuracy. Each corrects the slopes (Broyden 1965),
+    which are taken anew where one takes away much less than they promise.
     """
     x = np.clip(problem.start, problem.low, problem.high)
     held = _Held(replace(problem, coarse=None), x)
-    residuals, slopes = held.slopes(x)
+    residuals, slopes, taken = held.first_slopes(x)
     cost = float(np.mean(np.square(residuals)))
     if not math.isfinite(cost):
-        return Solution(x, np.full((x.size, x.size), np.inf), math.inf)
+        unknown = np.full((x.size, x.size), np.inf)
+        return Solution(x, unknown, math.inf, np.zeros_like(unknown))
+    sound = taken
     for _ in range(DESCENTS):
-        neighbours, slopes = held.slopes_along(x, residuals, slopes)
-        tried = np.vstack([neighbours, held.steps(x, residuals, slopes)])
+        tried = held.steps(x, residuals, slopes)
+        if not sound:
+            curvature = slopes.T @ slopes
+            neighbour, slopes, _ = held.slopes_along(x, residuals, slopes, curvature)
+            tried, taken = np.vstack([neighbour, held.steps(x, residuals, slopes)]), True
         left = held.residuals(tried)
         costs = np.nan_to_num(np.mean(np.square(left), axis=1), nan=np.inf)
-        best, before = int(np.argmin(costs)), cost
-        if costs[best] < cost:
+        best = int(np.argmin(costs))
+        foreseen = residuals + slopes @ (tried[best] - x)
+        promised = cost - float(np.mean(np.square(foreseen)))
+        gained, least = cost - costs[best], accuracy * cost
+        if gained > 0.0:
+            slopes = _corrected(slopes, tried[best] - x, left[best] - foreseen)
             x, residuals, cost = tried[best], left[best], float(costs[best])
-        if costs[best] > (1.0 - accuracy) * before:
+        if taken and gained < least:
             break
-    return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost))
+        sound, taken = gained > max(least, KEPT * promised), False
+    return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost), slopes.T @ slopes)
+
+
+def _corrected(slopes: Array, step: Array, unforeseen: Array) -> Array:
+    """Return slopes, (n, k), changed the least that explains what they missed, (n,), in a step."""
+    along = slopes.T @ (slopes @ step)
+    change = np.outer(unforeseen, along / (step @ along))
+    return np.asarray(slopes + np.where(_told(slopes), change, 0.0))
 
 
 class _Held:
@@ -155,26 +181,45 @@ class _Held:
         residuals = np.append(values[0], self._weight * (x - self._expected))
         return residuals, np.vstack([slopes, np.diag(self._weight)])
 
-    def slopes_along(self, x: Array, residuals: Array, slopes: Array) -> tuple[Array, Array]:
-        """Return the slopes, (n + k, k), at x along the principal axes of former ones.
+    def first_slopes(self, x: Array) -> tuple[Array, Array, bool]:
+        """Return the residuals, (n + k,), at x, (k,), and their slopes, (n + k, k).
 
-        residuals: (n + k,), at x. And the best of the points, (1, k), that were simulated for it.
-        Where a step leads far off, the former slopes stay.
+        And whether they were taken along the principal axes of a fit before.
+        """
+        curvature = self._problem.curvature
+        if curvature is not None:
+            residuals = self.residuals(x[None])[0]
+            held = np.zeros((residuals.size, x.size))
+            held[-x.size :] = np.diag(self._weight)
+            _, slopes, complete = self.slopes_along(x, residuals, held, curvature)
+            if complete:
+                return residuals, slopes, True
+        return *self.slopes(x), False
+
+    def slopes_along(
+        self, x: Array, residuals: Array, former: Array, curvature: Array
+    ) -> tuple[Array, Array, bool]:
+        """Return slopes, (n + k, k), at x along the principal axes of a curvature, (k, k).
+
+        residuals: (n + k,), at x. Where a step leads far off, the former slopes, (n + k, k), stay.
+        And the best of the points, (1, k), that were simulated, and whether all steps stayed near.
         """
         problem = self._problem
-        _, sizes, axes = np.linalg.svd(slopes, full_matrices=False)
-        longest = LONGEST / np.max(np.abs(axes), axis=1)
-        steps = np.minimum(REACH / sizes, longest)[:, None] * axes
+        squares, axes = np.linalg.eigh(curvature)
+        reach = REACH / np.sqrt(np.maximum(squares, HELD**2))
+        longest = LONGEST / np.max(np.abs(axes), axis=0)
+        steps = (np.minimum(reach, longest) * axes).T
         outside = np.any((x + steps < problem.low) | (x + steps > problem.high), axis=1)
         points = np.clip(x + np.where(outside[:, None], -steps, steps), problem.low, problem.high)
         values = self.residuals(points)
         costs = np.nan_to_num(np.mean(np.square(values), axis=1), nan=np.inf)
         near = costs <= FAR * np.mean(np.square(residuals))
         moved = points[near] - x
-        unforeseen = values[near] - residuals - moved @ slopes.T
+        unforeseen = values[near] - residuals - moved @ former.T
         change = np.linalg.lstsq(moved, unforeseen, rcond=1e-9)[0].T
-        best = points[[int(np.argmin(costs))]]
-        return best, slopes + np.where(_told(slopes), change, 0.0)
+        told = np.diag(curvature) > TOLD * self._weight**2
+        slopes = former + np.where(told, change, 0.0)
+        return points[[int(np.argmin(costs))]], slopes, bool(np.all(near))
 
     def steps(self, x: Array, residuals: Array, slopes: Array) -> Array:
         """Return where steps with several dampings lead, (m, k)."""

@@ -134,7 +134,7 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
         seconds = DRAWN if fitted.misfit <= AT_NOISE else DRAWN_OF_EACH
         time, x = _next(known, evidence, fitted, time, end, seconds)
         accuracy = ON_THE_WAY if time < end else ACCURACY
-        fitted = _fitted(known, evidence.until(time), x, accuracy, method)
+        fitted = _fitted(known, evidence.until(time), x, accuracy, method, fitted.curvature)
     return fitted
 
 
@@ -163,8 +163,14 @@ def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:
     return np.asarray(np.nan_to_num(np.sqrt(np.mean(np.square(left), axis=1)), nan=np.inf))
 
 
-def _fitted(
-    known: Trial, evidence: Evidence, x: Array, accuracy: float, method: Method = fit
+def _fitted(  # noqa: PLR0913, PLR0917 (as _led)
+    known: Trial,
+    evidence: Evidence,
+    x: Array,
+    accuracy: float,
+    method: Method = fit,
+    curvature: Array | None = None,
 ) -> Solution:
     problem = free_run_problem(known, evidence, x)
-    return method(replace(problem, coarse=None, step=SLOPE_STEP), accuracy)
+    problem = replace(problem, coarse=None, step=SLOPE_STEP, curvature=curvature)
+    return method(problem, accuracy)

@@ -89,32 +89,54 @@ def test_a_descent_from_where_nothing_can_be_simulated_says_so() -> None:
     assert descended(problem, 1e-3).misfit == np.inf
 
 
+class Valley:
+    """Residuals that a step along one number alone leaves: there they are off at random.
+
+    So do those of a piston that sticks at other instants. rough: by which share of their size.
+    At the optimum the squares are fewer than at the truth by about as many as there are numbers
+    (chi-square).
+    """
+
+    def __init__(self, seed: int, rough: float) -> None:
+        count, random = 2000, np.random.default_rng(seed)
+        sizes = np.logspace(4.0, 0.5, SIZE)  # what a step of one along each axis does
+        axes = np.linalg.qr(random.normal(size=(SIZE, SIZE)))[0]
+        true = 0.3 * random.normal(size=SIZE)
+        directions = random.normal(size=(count, SIZE)) / np.sqrt(count)
+        noise, phase = random.normal(size=count), random.uniform(0.0, 2.0 * np.pi, size=count)
+        deviations = np.where(np.arange(SIZE) < SIZE // 2, 1.0, 10.0)  # by the most uncertain
+        self.start = true + axes @ np.clip(deviations / sizes * random.normal(size=SIZE), -0.5, 0.5)
+        self.curvature = axes * sizes**2 @ axes.T
+
+        def model(points: Array) -> Array:
+            z = ((points - true) @ axes * sizes) @ directions.T * np.sqrt(count)
+            off = np.where(np.abs(z) > 10.0, rough * z * np.sin(2.0 * z + phase), 0.0)
+            return np.asarray((z + off) / np.sqrt(count) + noise)
+
+        self.model, self._least = model, np.sum(noise**2)
+
+    def excess(self, x: Array) -> float:
+        """Return the squares at x, (SIZE,), beyond those at the truth."""
+        return float(np.sum(self.model(x[None]) ** 2) - self._least)
+
+    def descended(self, curvature: Array | None = None) -> Solution:
+        """Return where a descent ends; curvature: (SIZE, SIZE), what it knows beforehand."""
+        bound, free = np.full(SIZE, 5.0), np.zeros(SIZE, dtype=bool)
+        problem = Problem(self.model, self.start, -bound, bound, free, None, 3e-3, curvature)
+        return descended(problem, 1e-4)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_descent_follows_a_narrow_valley_with_steep_and_rough_walls(seed: int) -> None:
-    """A step along one number leaves the valley: residuals there are off by a fifth at random.
+    valley = Valley(seed, 0.2)
+    assert valley.excess(valley.start) > 50.0
+    assert valley.excess(valley.descended().x) < 0.0
 
-    So do the residuals of a piston that sticks at other instants. At the optimum the squares are
-    fewer than at the truth by about as many as there are numbers (chi-square).
-    """
-    count, random = 2000, np.random.default_rng(seed)
-    sizes = np.logspace(4.0, 0.5, SIZE)  # what a step of one along each axis does
-    axes = np.linalg.qr(random.normal(size=(SIZE, SIZE)))[0]
-    true = 0.3 * random.normal(size=SIZE)
-    directions = random.normal(size=(count, SIZE)) / np.sqrt(count)
-    noise, phase = random.normal(size=count), random.uniform(0.0, 2.0 * np.pi, size=count)
-    deviations = np.where(np.arange(SIZE) < SIZE // 2, 1.0, 10.0)  # off by the most uncertain
-    start = true + axes @ np.clip(deviations / sizes * random.normal(size=SIZE), -0.5, 0.5)
 
-    def model(points: Array) -> Array:
-        z = ((points - true) @ axes * sizes) @ directions.T * np.sqrt(count)
-        rough = np.where(np.abs(z) > 10.0, 0.2 * z * np.sin(2.0 * z + phase), 0.0)
-        return np.asarray((z + rough) / np.sqrt(count) + noise)
-
-    def excess(x: Array) -> float:
-        return float(np.sum(model(x[None]) ** 2) - np.sum(noise**2))
-
-    bound = np.full(SIZE, 5.0)
-    free = np.zeros(SIZE, dtype=bool)
-    found = descended(Problem(model, start, -bound, bound, free, step=3e-3), 1e-4)
-    assert excess(start) > 50.0
-    assert excess(found.x) < 0.0
+@pytest.mark.parametrize("seed", range(4))
+def test_a_descent_goes_on_from_what_a_fit_to_a_part_of_the_data_knows(seed: int) -> None:
+    """Between rougher walls it does not find its way without: the shorter part's axes lead it."""
+    valley = Valley(seed, 0.5)
+    part = 0.25 * valley.curvature + np.eye(SIZE)  # half as well known, and held
+    assert valley.excess(valley.start) > 50.0
+    assert valley.excess(valley.descended(part).x) < 0.0

@@ -108,13 +108,14 @@ class Experiment:
     def start(self) -> tuple[float, float]:
         """Return angle, rad, and p_S, Pa, at rest when the recording starts.
 
-        The mean of the first samples, and where a line through them begins: a leak moves p_S by
-        several times its noise while the boom rests. p_S is NaN where no sensor shows it.
+        The first reading, since a leak may let the boom sink by many steps of a fine resolver
+        before its first move, and where a line through the first samples begins: it moves p_S by
+        several times its noise. p_S is NaN where no sensor shows it.
         """
         pressure = self.outputs[: self.rest, 2]
         later = self.time[: self.rest] - self.time[: self.rest].mean()
         slope = later @ pressure / max(later @ later, self.period**2)
-        return float(self.angle[: self.rest].mean()), float(pressure.mean() + slope * later[0])
+        return float(self.angle[0]), float(pressure.mean() + slope * later[0])
 
 
 def open_experiment(path: Path, signal_map: SignalMap, machine: Machine) -> Experiment:

@@ -80,6 +80,16 @@ def test_the_pressure_at_the_start_is_known_while_oil_leaks(samples: int) -> Non
         assert abs(found - 25e5) < 4.5 * noise  # that seldom, of a line through two samples
 
 
+def test_the_angle_at_the_start_is_known_while_the_boom_sinks() -> None:
+    """Through a leak, by many steps of a fine resolver, before the first move."""
+    leaky = {"effects.internal_leakage.coefficient": 2e-11, "sensors.resolver_bits": 19}
+    machine = with_values(joint1(), leaky)
+    step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
+    experiment = run(machine, 2.0)
+    assert np.ptp(experiment.angle[: experiment.rest]) > 4.0 * step
+    assert abs(experiment.start()[0] - 0.8) <= 0.5 * step
+
+
 def test_readings_that_stay_the_same_count_as_one() -> None:
     outputs = np.random.default_rng(1).standard_normal((6, 4))
     outputs[:, 0] = [0.0, 1.0, 1.0, 1.0, 1.0, 0.0]

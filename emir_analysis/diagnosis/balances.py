@@ -68,7 +68,7 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 STEP = 0.25  # s, from one window to the next
-DRAWN = 60.0  # s of the sensors' noise, about, from which the floor is found
+DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
 
 
 class Balances:

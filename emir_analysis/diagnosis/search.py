@@ -198,10 +198,10 @@ class Search:
         self._progress(f"friction by a growing beginning: {best.trial.name}")
         start = fullest(best.trial, self._sheet)
         law = begun(start, self._evidence, self.floor)
-        law = with_less_friction(law, self._evidence, self._sheet, self.floor)
+        law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
         if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
             return equal, best
-        found = grown(law, self._evidence)
+        found = self._grown(law, fuller)
         if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
             return equal, best
         self._whole[found.effects] = found
@@ -209,6 +209,20 @@ class Search:
         told = self._scored(found, free_run_score(found, self._evidence))
         self.tried.append(told)
         return [found], told
+
+    def _grown(self, law: Trial, fuller: list[Trial]) -> Trial:
+        """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
+
+        A break-away may show in later sticks than those of the beginning.
+        """
+        found = grown(law, self._evidence)
+        for more in fuller:
+            if at_noise(found, self._evidence):
+                break
+            led = grown(more, self._evidence)
+            if at_noise(led, self._evidence):
+                found = led
+        return found
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.

@@ -77,8 +77,8 @@ def _distinct(fits: list[Solution]) -> list[Solution]:
     return found
 
 
-def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Array) -> Trial:
-    """Return a trial with as little friction as will do over the beginning up to DECIDED.
+def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Array) -> list[Trial]:
+    """Return trials with as much friction as a beginning up to DECIDED needs, and more behind.
 
     More has to take half of the rest away: a law that is a little off is mimicked by another.
     And it has to be more than the force balance could tell from noise. What is left out is held
@@ -90,14 +90,14 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
     limit = _score(misfit, known, begin) + STRONG
     _, velocity = evidence.signals()["piston_velocity"]
     unheard = viscous_force(known, float(np.max(np.abs(velocity)))) < floor[FORCE]
-    fewer = simpler(known, sheet)
+    laws, fewer = [known], simpler(known, sheet)
     while fewer:
         fitted, left = _further(fewer.pop(0), begin)
         no_worse = _score(left, fitted, begin) < limit
         no_worse |= unheard and VISCOUS in known.effects and VISCOUS not in fitted.effects
         if no_worse or 0.5 * (left**2 - 1.0) < misfit**2 - 1.0:
-            known, fewer = fitted, simpler(fitted, sheet)
-    return known
+            laws, fewer = [fitted, *laws], simpler(fitted, sheet)
+    return laws
 
 
 def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:

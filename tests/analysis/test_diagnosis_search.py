@@ -21,6 +21,7 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import STRONG, balance_score, speaks
+from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
@@ -32,8 +33,12 @@ SHIFT = {"effects.valve_null_offset.offset": 0.03}
 
 def run(machine: Machine, duration: float = 16.0, pressure: float = 20e5) -> Experiment:
     """Return a run of a machine, from a p_S at rest, Pa, as its sensors show it."""
-    held = round(recorded.COMMAND_PERIOD / COMMAND_STEP)
-    commands = np.repeat(recorded.moves(duration, seed=5), held)
+    return operated(machine, recorded.moves(duration, seed=5), pressure)
+
+
+def operated(machine: Machine, valve_command: Array, pressure: float = 20e5) -> Experiment:
+    """Return the same under a valve command, one value every 32 ms."""
+    commands = np.repeat(valve_command, round(recorded.COMMAND_PERIOD / COMMAND_STEP))
     samples = commands.size // 10 + 1
     empty = Experiment(
         "run", 10 * COMMAND_STEP, commands, np.zeros(samples), np.zeros((samples, 4)), 20

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from test_diagnosis_search import TOLERANCES, search
+import recorded
+from test_diagnosis_search import TOLERANCES, operated, search
 
 from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
 from emir_analysis.diagnosis.friction_laws import fullest, nested
@@ -17,6 +18,7 @@ from emir_analysis.diagnosis.stick_slip import (
     grown,
     with_less_friction,
 )
+from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 
 HIDDEN = {
@@ -37,7 +39,7 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     searched, sheet, evidence = search(HIDDEN)
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
     law = begun(fullest(known, sheet), evidence, searched.floor)
-    assert with_less_friction(law, evidence, sheet, searched.floor) is law
+    assert with_less_friction(law, evidence, sheet, searched.floor) == [law]
     found = grown(law, evidence)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -76,12 +78,30 @@ def test_no_more_friction_stays_than_there_is() -> None:
     """A machine with Coulomb friction alone."""
     searched, sheet, evidence = search(SLIDING)
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
-    law = with_less_friction(law, evidence, sheet, searched.floor)
+    law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
     fitted = grown(law, evidence)
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
     assert fitted.machine.effects.coulomb_friction.force == pytest.approx(2e4, rel=0.03)
+
+
+def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:
+    """Ten seconds of one slow move, then moves to and fro, each of which sticks where it ends."""
+    hidden = HIDDEN | {
+        "effects.stribeck_friction.force": 4e3,
+        "effects.stribeck_friction.breakaway": 1.7,
+        "effects.viscous_friction.coefficient": 0.0,
+    }
+    command = recorded.moves(24.0, seed=5)
+    time = recorded.COMMAND_PERIOD * np.arange(command.size)
+    slow = np.interp(time, [1.0, 2.0, 10.6, 11.0], [0.0, 0.3, 0.3, 0.0])
+    command = np.where(time < 11.0, slow, command)
+    searched, _, evidence = search({}, lambda _: operated(with_values(joint1(), hidden), command))
+    found = searched.run()[0]
+    assert found.effects == ("stribeck_friction",)
+    errors = np.concatenate(free_run_errors(found.machine, evidence))
+    assert np.sqrt(np.mean(errors**2)) < 1.05
 
 
 def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:

@@ -127,11 +127,12 @@ def descended(problem: Problem, accuracy: float) -> Solution:
         return Solution(x, unknown, math.inf, np.zeros_like(unknown))
     sound = taken
     for _ in range(DESCENTS):
-        tried = held.steps(x, residuals, slopes)
+        neighbours = np.empty((0, x.size))
         if not sound:
             curvature = slopes.T @ slopes
-            neighbour, slopes, _ = held.slopes_along(x, residuals, slopes, curvature)
-            tried, taken = np.vstack([neighbour, held.steps(x, residuals, slopes)]), True
+            neighbours, slopes, _ = held.slopes_along(x, residuals, slopes, curvature)
+            taken = True
+        tried = np.vstack([neighbours, held.steps(x, residuals, slopes)])
         left = held.residuals(tried)
         costs = np.nan_to_num(np.mean(np.square(left), axis=1), nan=np.inf)
         best = int(np.argmin(costs))

@@ -94,7 +94,7 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
     while fewer:
         fitted, left = _further(fewer.pop(0), begin)
         no_worse = _score(left, fitted, begin) < limit
-        no_worse |= unheard and VISCOUS in known.effects and VISCOUS not in fitted.effects
+        no_worse |= unheard and VISCOUS in laws[0].effects and VISCOUS not in fitted.effects
         if no_worse or 0.5 * (left**2 - 1.0) < misfit**2 - 1.0:
             laws, fewer = [fitted, *laws], simpler(fitted, sheet)
     return laws

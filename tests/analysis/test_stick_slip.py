@@ -86,6 +86,13 @@ def test_no_more_friction_stays_than_there_is() -> None:
     assert fitted.machine.effects.coulomb_friction.force == pytest.approx(2e4, rel=0.03)
 
 
+def test_viscous_friction_that_is_not_heard_takes_no_break_away_with_it() -> None:
+    searched, sheet, evidence = search(HIDDEN | {"effects.viscous_friction.coefficient": 0.0})
+    law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
+    least, *_ = with_less_friction(law, evidence, sheet, searched.floor)
+    assert least.effects == ("stribeck_friction",)
+
+
 def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:
     """Ten seconds of one slow move, then moves to and fro, each of which sticks where it ends."""
     hidden = HIDDEN | {

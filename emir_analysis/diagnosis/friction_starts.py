@@ -21,7 +21,8 @@ SHAPES = {  # that are tried in all combinations
     "effects.stribeck_friction.smoothing_speed": (2e-4, 6e-4, 1.8e-3),  # m/s
 }
 INSIDE = 1e-6  # in units of an unknown, of its bounds, as the solver demands
-SIZES = ("effects.stribeck_friction.force", "effects.viscous_friction.coefficient")
+DRY = "effects.stribeck_friction.force"
+VISCOUS = "effects.viscous_friction.coefficient"
 
 
 def friction_starts(start: Trial, evidence: Evidence, floor: Array, first: float) -> list[Trial]:
@@ -44,8 +45,8 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
         return np.nan_to_num(left[:, :, evidence.fitted].reshape(len(points), -1))
 
     paths = [unknown.path for unknown in start.unknowns.members]
-    shaping, sizes = [paths.index(p) for p in SHAPES], [paths.index(p) for p in SIZES]
-    others = [k for k in range(len(paths)) if k not in (*shaping, *sizes)]
+    shaping, dry, viscous = [paths.index(p) for p in SHAPES], paths.index(DRY), paths.index(VISCOUS)
+    others = [k for k in range(len(paths)) if k not in (*shaping, dry, viscous)]
     # how the others act depends little on the friction: found once
     _, high = start.unknowns.bounds
     steps = np.where(start.x + STEP > high, -STEP, STEP)
@@ -54,12 +55,15 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
     shapes = _grid(start)
     points = np.tile(start.x, (len(shapes), 1))
     points[:, shaping] = shapes
-    points[:, sizes] = 0.0
-    nothing = missing(points)
-    each = [missing(points + np.eye(start.x.size)[size]) - nothing for size in sizes]
-    free = np.array(others + sizes)
-    for point, left, *friction in zip(points, nothing, *each, strict=True):
-        point[free] = _least(start, point, free, left, np.vstack([acting, *friction]))
+    points[:, [dry, viscous]] = 0.0
+    size = np.eye(start.x.size)
+    # without dry friction its shape makes no difference
+    without, flowing = missing(points[0] + np.outer([0.0, 1.0], size[viscous]))
+    sliding = missing(points + size[dry])
+    acting = np.vstack([acting, flowing - without])
+    free = np.array([*others, viscous, dry])
+    for point, own in zip(points, sliding - without, strict=True):
+        point[free] = _least(start, point, free, without, np.vstack([acting, own]))
     return points
 
 

@@ -32,6 +32,7 @@ SMALL = 0.1  # trial sizes, at which the free run is near enough to the known on
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 LOAD = "external_load"
+BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 
 Missing = Callable[[list[Trial]], Array]
@@ -205,7 +206,9 @@ def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
     force = evidence.residuals([known.machine])[0][: evidence.windows_of_first, FORCE]
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
-    return likely(of_force(evidence.time[: force.size], at_tip * np.nan_to_num(force)))
+    force = at_tip * np.nan_to_num(force)
+    constant = Load(float(np.mean(force)), 0.0, 0.0, BEFORE, FOR_EVER)
+    return [constant, *likely(of_force(evidence.time[: force.size], force))]
 
 
 def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) -> list[Load]:

@@ -13,8 +13,8 @@ from emir_plant.jit import compiled
 class ExternalLoad(Effect):
     """Force across the boom at the TCP, up positive: F cos(2 pi f (t - t_0) + phase).
 
-    It acts from t_0 for a duration. f = 0 gives a constant load or, with a short duration, a
-    pulse; f > 0 a harmonic one.
+    It acts from t_0 for a duration; with t_0 before the run the machine rests under it. f = 0
+    gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -31,7 +31,7 @@ class ExternalLoad(Effect):
     force: float = quantity("N", -1e5, 1e5, "F", default=0.0)
     frequency: float = quantity("Hz", 0.0, 20.0, "f; 0: constant while it acts", default=0.0)
     phase: float = quantity("rad", -6.3, 6.3, "at the start", default=0.0)
-    start: float = quantity("s", 0.0, 1e6, "t_0, since the start of the run", default=0.0)
+    start: float = quantity("s", -1e6, 1e6, "t_0, since the start of the run", default=0.0)
     duration: float = quantity("s", 1e-3, 1e6, "how long it acts", default=1e6)
 
 

@@ -273,7 +273,7 @@ def _integral(rate: Array, period: float) -> Array:
 
 
 def noise_floor(experiment: Experiment, machine: Machine) -> Array:
-    """Return the residuals, (d w, 5), that the sensors alone leave in each balance, in d draws.
+    """Return the residuals, (d, w, 5), that the sensors alone leave in each balance, in d draws.
 
     Found by simulating the machine under the recorded command, reading it through the sensors'
     noise and quantisation, and computing its balances with its own parameters. Of a short
@@ -294,7 +294,7 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
             " check the data sheet"
         )
     seen = [sensed(experiment, machine, run, seed) for seed, run in enumerate(ideal)]
-    return np.concatenate([Balances(each, machine).residuals([machine])[0] for each in seen])
+    return np.array([Balances(each, machine).residuals([machine])[0] for each in seen])
 
 
 def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:

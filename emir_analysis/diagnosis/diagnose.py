@@ -8,7 +8,7 @@ from emir_analysis.diagnosis.candidates import Trial, fit_balances, free_run_err
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.search import Progress, Search, Tried
-from emir_analysis.diagnosis.select import explained, quiet, speaks
+from emir_analysis.diagnosis.select import explained, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
@@ -22,8 +22,8 @@ class Findings:
     with the effects named, both fitted to the whole recordings. rejected: effects that were best
     among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
-    `after`; floor: (5,) the sensors' share. speaking: the loudest balance that is not down to
-    the noise at the end, shape: of its residual.
+    `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
+    the loudest balance that is not down to the noise at the end, shape: of its residual.
     """
 
     evidence: Evidence
@@ -36,6 +36,7 @@ class Findings:
     rivals: tuple[Trial, ...]
     residuals: dict[str, Array]
     floor: Array
+    limit: Array
     speaking: str | None
     shape: Shape | None
 
@@ -52,16 +53,15 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     after = unaided
     if final.effects:
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
-    floor = evidence.floor(final.machine)
-    good = quiet(level(after), floor, evidence)
+    good = quiet(level(after), limits(final.machine, evidence))
     good = good and explained(free_run_errors(final.machine, evidence))
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
         refitted = final = search.whole(final)
     if verdict == "unexplained":
         final, after = refitted, unaided
-        floor = evidence.floor(final.machine)
-    speaking = loudest(after, floor, evidence)
+    floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
+    speaking = loudest(after, floor, limit)
     return Findings(
         evidence=evidence,
         sheet=sheet,
@@ -73,6 +73,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         rivals=tuple(best[1:]),
         residuals={"before": before, "refitted": unaided, "after": after},
         floor=floor,
+        limit=limit,
         speaking=speaking,
         shape=None if speaking is None else _shape(evidence, after, speaking),
     )
@@ -86,13 +87,14 @@ def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:
     return "ambiguous" if rival_count else "found"
 
 
-def loudest(residual: Array, floor: Array, evidence: Evidence) -> str | None:
-    """Return the balance that is furthest above its noise, if one speaks.
+def loudest(residual: Array, floor: Array, limit: Array) -> str | None:
+    """Return the balance that is furthest above its noise, (5,), if one speaks: limit, (5,).
 
     A missing force bends the boom too, so the bending counts only where nothing else speaks.
     """
-    loudness = dict(zip(BALANCES, level(residual) / floor, strict=True))
-    loud = [name for name, ratio in loudness.items() if ratio > speaks(evidence)]
+    left = level(residual)
+    loudness = dict(zip(BALANCES, left / floor, strict=True))
+    loud = [name for name, over in zip(BALANCES, left > limit, strict=True) if over]
     first = [name for name in loud if name != "bending"]
     return max(first or loud, key=loudness.__getitem__, default=None)
 

@@ -1,7 +1,7 @@
 """All recordings of one machine together: their balances and free runs in one vector each."""
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -95,7 +95,20 @@ class Evidence:
 
         NaN where it is not told. The linkage balance is exact: there it is the stroke's own noise.
         """
-        left = np.concatenate([noise_floor(e, machine) for e in self.experiments])
+        left = np.concatenate([np.concatenate(draws) for draws in _drawn(self, machine)])
         floor = np.where(self.told, level(left), np.nan)
         floor[LINKAGE] = self.sensors[0]
         return floor
+
+    def drawn_levels(self, machine: Machine) -> Array:
+        """Return the same of each of d draws of the sensors' noise, (d, 5), the linkage's NaN."""
+        draws = _drawn(self, machine)
+        count = min(len(draw) for draw in draws)
+        levels = [level(np.concatenate([draw[k] for draw in draws])) for k in range(count)]
+        told = self.told & (np.arange(self.told.size) != LINKAGE)
+        return np.where(told, levels, np.nan)
+
+
+@lru_cache(maxsize=2)  # floor and drawn levels are asked for of one machine
+def _drawn(evidence: Evidence, machine: Machine) -> list[Array]:
+    return [noise_floor(e, machine) for e in evidence.experiments]

@@ -124,7 +124,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             "The band is twice the sensors' noise.",
         ),
     ]
-    if not quiet(level(findings.residuals["refitted"]), findings.floor, findings.evidence):
+    if not quiet(level(findings.residuals["refitted"]), findings.limit):
         figure, name = shape_picture(findings)
         blocks.append(
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")

@@ -82,7 +82,7 @@ def balances_picture(findings: Findings) -> Figure:
 def shape_picture(findings: Findings) -> tuple[Figure, str]:
     """Show the loudest balance of the re-fitted machine against what might govern it."""
     refitted = findings.residuals["refitted"]
-    name = loudest(refitted, findings.floor, findings.evidence) or "force"
+    name = loudest(refitted, findings.floor, findings.limit) or "force"
     k = list(BALANCES).index(name)
     label, factor = SHOWN.get(name, (name, 1.0))
     means = {key: values for key, (_, values) in findings.evidence.signals().items()}

@@ -1,12 +1,13 @@
 """Choosing among trials: by the balances, then by a free run that no fit has seen."""
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from emir_analysis.diagnosis.balances import FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
+from emir_plant.parameters import Machine
 
 SEEN = 2.0 / 3.0  # share of each recording, from its start, that the fits see before the choice
 STRONG = 10.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
@@ -14,6 +15,7 @@ SPEAKS = np.sqrt(2.0)  # times the floor: what is systematic is then larger than
 CHANCE = 1e-3  # with which noise alone may make a balance of a short recording speak
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
+FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balance varies by chance
 BLOCK = 1.0  # s: errors closer than this are not counted as independent
 
 
@@ -77,12 +79,26 @@ def speaks(evidence: Evidence) -> float:
     return max(float(SPEAKS), float(np.sqrt(chi2.isf(CHANCE, windows) / windows)))
 
 
-def quiet(left: Array, floor: Array, evidence: Evidence) -> bool:
-    """Tell whether no balance holds more than its noise; left, floor: levels, (b,).
+def limits(machine: Machine, evidence: Evidence) -> Array:
+    """Return the levels, (b,), from which on each balance of a machine speaks; NaN: never.
+
+    Of a short recording at times more than `speaks` says: windows are not all alike where a
+    coarse resolver stays in one step or a piston sticks. How much more the draws of noise tell.
+    """
+    levels = evidence.drawn_levels(machine)
+    factor = np.full(levels.shape[1], speaks(evidence))
+    if len(levels) >= FEWEST_DRAWN:
+        spread = np.std(np.log(levels), axis=0, ddof=1)
+        factor = np.fmax(factor, np.exp(norm.isf(CHANCE) * spread))
+    return np.asarray(factor * evidence.floor(machine))
+
+
+def quiet(left: Array, limit: Array) -> bool:
+    """Tell whether no balance speaks: levels, (b,), and from where on they do.
 
     NaN, a balance that the signals do not allow, is quiet.
     """
-    return not np.any(left > speaks(evidence) * floor)
+    return not np.any(left > limit)
 
 
 def explained(errors: list[Array]) -> bool:

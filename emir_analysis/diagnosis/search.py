@@ -30,6 +30,7 @@ from emir_analysis.diagnosis.select import (
     excess,
     explained,
     free_run_score,
+    limits,
     quiet,
     rivals,
 )
@@ -336,7 +337,16 @@ class Search:
             best_way = int(np.argmin(scores))
             simulated.append(Tried(ways[best_way], tried.balances, scores[best_way]))
         self.tried += simulated
-        return [t for t in simulated if _free(t) < _free(best) - STRONG]
+        better = [t for t in simulated if _free(t) < _free(best) - STRONG]
+        return better or [t for t in simulated if self._suffices(t.trial, best.trial)]
+
+    def _suffices(self, tried: Trial, best: Trial) -> bool:
+        """Tell whether the whole recordings need no more than a trial, and that far more than best.
+
+        For recordings too short for a part held back to tell: nothing may move in it.
+        """
+        better = self._on_whole(tried) < self._on_whole(best) - STRONG
+        return better and not self._enough(best) and self._enough(tried)
 
     def _enough(self, tried: Trial) -> bool:
         """Tell whether a trial leaves no balance speaking and explains the free run."""
@@ -344,7 +354,7 @@ class Search:
 
     def _quiet(self, tried: Trial) -> bool:
         left = level(self._evidence.residuals([tried.machine])[0])
-        return quiet(left, self._evidence.floor(tried.machine), self._evidence)
+        return quiet(left, limits(tried.machine, self._evidence))
 
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)

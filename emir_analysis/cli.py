@@ -353,8 +353,14 @@ def _diagnose(words: list[str]) -> int:
 
     parser = argparse.ArgumentParser(prog="emir diagnose")
     parser.add_argument("bag", type=Path, nargs="+", help="recordings to find out from")
-    parser.add_argument("--datasheet", type=Path, required=True, help="YAML of the machine")
-    parser.add_argument("--signals", type=Path, required=True, help="YAML: signal, topic, field")
+    parser.add_argument(
+        "--datasheet", type=Path, metavar="FILE",
+        help="YAML of the machine (default: joint 1 as the plant node has it)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--signals", type=Path, metavar="FILE",
+        help="YAML: signal, topic, field (default: the graph's topics)",
+    )  # fmt: skip
     parser.add_argument(
         "--judge", type=Path, nargs="+", action="extend", metavar="BAG",
         help="recordings to be judged on",
@@ -369,7 +375,9 @@ def _diagnose(words: list[str]) -> int:
         "--predictions", type=Path, metavar="DIR", help="write the simulated runs as MCAP"
     )
     o = parser.parse_args(words)
-    if is_actuator(o.datasheet):
+    if o.datasheet is not None and is_actuator(o.datasheet):
+        if o.signals is None:
+            raise InputError(f"{o.datasheet}: an actuator needs --signals")
         judges = o.judge or [None]
         if len(o.bag) > 1 or len(judges) > 1:
             raise InputError(

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from emir_analysis.diagnosis.control import before_and_after
 from emir_analysis.diagnosis.diagnose import diagnose
-from emir_analysis.diagnosis.experiment import open_experiment
+from emir_analysis.diagnosis.experiment import Experiment, open_experiment
+from emir_analysis.diagnosis.graph_signals import graph_signals
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.model_file import write_model
 from emir_analysis.diagnosis.page import write_page
@@ -13,16 +14,17 @@ from emir_analysis.diagnosis.predictions import check_folder, write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
 from emir_analysis.diagnosis.search import Progress
 from emir_analysis.errors import InputError
-from emir_analysis.signals import read_signal_map
-from emir_plant.sheet import load_sheet
+from emir_analysis.signals import SignalMap, read_signal_map
+from emir_plant.parameters import Machine
+from emir_plant.sheet import data, load_sheet
 
 Bags = Path | Sequence[Path]
 
 
 def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     bag: Bags,
-    datasheet: Path,
-    signals: Path,
+    datasheet: Path | None,
+    signals: Path | None,
     judge: Bags | None,
     json: Path | None,
     html: Path | None,
@@ -33,26 +35,27 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
 ) -> Diagnosis:
     """Find out from the recordings `bag` what the data sheet's machine lacks.
 
-    signals: YAML map from signals to topics. judge: recordings on which the errors are stated,
+    datasheet: EMIR's joint 1 as the project states it when not given. signals: YAML map from
+    signals to topics, the graph's when not given. judge: recordings on which the errors are stated,
     opened when everything is fitted; `bag` itself when not given. json, html: files to write.
     model_out: file for the machine as found; a controller designed before and after is then
     compared on it. predictions: folder for the simulated runs. Raises InputError or
     ParameterError, one line each, for anything that cannot be used.
     """
     _check_outputs([json, html, model_out], predictions)
-    sheet = load_sheet(datasheet)
+    sheet = load_sheet(datasheet or data("joint1.yaml"))
     judges = _several(judge)
     missing = [path for path in judges if not path.exists()]
     if missing:
         raise InputError(f"{missing[0]}: no such recording")
-    signal_map = read_signal_map(signals)
+    signal_map = None if signals is None else read_signal_map(signals)
     experiments = []
     for path in _several(bag):
         progress(f"reading {path}")
-        experiments.append(open_experiment(path, signal_map, sheet.machine))
+        experiments.append(_opened(path, signal_map, sheet.machine))
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
-    opened = [open_experiment(path, signal_map, sheet.machine) for path in judges]
+    opened = [_opened(path, signal_map, sheet.machine) for path in judges]
     judgement = judged(findings, opened or experiments)
     control = None
     if model_out is not None:
@@ -68,6 +71,11 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     if html is not None:
         write_page(html, findings, result, judgement)
     return result
+
+
+def _opened(path: Path, signal_map: SignalMap | None, machine: Machine) -> Experiment:
+    known = graph_signals(path) if signal_map is None else signal_map
+    return open_experiment(path, known, machine)
 
 
 def _check_outputs(files: Sequence[Path | None], folder: Path | None) -> None:

@@ -100,7 +100,7 @@ class Search:
             better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
-            equal = _as_good(better)
+            equal = self.simplest(_as_good(better), better)
             before[equal[0].effects] = equal
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
@@ -118,6 +118,21 @@ class Search:
                     equal, _ = self._by_beginning(equal, pair)
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
+
+    def simplest(self, equal: list[Trial], better: list[Tried]) -> list[Trial]:
+        """Return the best trials; one with fewer parameters where the whole knows nothing better.
+
+        Of two that both explain what they were fitted to, the part held back may prefer the one
+        whose parameters happen to be nearer.
+        """
+        best = equal[0]
+        for other in (t.trial for t in better):
+            fewer = other.x.size < best.x.size and not sticks(other)
+            if fewer and at_noise(best, self._head) and at_noise(other, self._head):
+                limit = self._on_whole(self.whole(best)) + STRONG
+                if self._on_whole(self.whole(other)) < limit:
+                    best, equal = other, [other]
+        return equal
 
     def whole(self, chosen: Trial) -> Trial:
         """Return a trial fitted to the free run of the whole recordings."""

@@ -21,8 +21,8 @@ from emir_analysis.diagnosis.diagnose import loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.search import Search
-from emir_analysis.diagnosis.select import STRONG, balance_score, limits, quiet, speaks
+from emir_analysis.diagnosis.search import Search, Tried
+from emir_analysis.diagnosis.select import SEEN, STRONG, balance_score, limits, quiet, speaks
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -196,6 +196,28 @@ def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")
     assert begun[0].needed(pair).effects == pair.effects
+
+
+@pytest.mark.parametrize(
+    ("missing", "named"),
+    [
+        ({"effects.command_delay.delay": 0.013}, "command_delay"),
+        ({"effects.sensor_delay.pressure_lifting": 0.03}, "sensor_delay"),
+    ],
+)
+def test_a_late_command_is_simpler_than_four_late_sensors(
+    missing: dict[str, float], named: str
+) -> None:
+    """Whichever extrapolates better; one late sensor it does not explain."""
+    begun = search(missing)
+    searched, sheet, evidence = begun
+    head = evidence.head(SEEN)
+    trials = [
+        fit_free_run(fit_balances(trial(sheet, (name,)), head, searched.floor), head)
+        for name in ("sensor_delay", "command_delay")
+    ]
+    chosen = searched.simplest(trials[:1], [Tried(each, 0.0) for each in trials])
+    assert [each.effects for each in chosen] == [(named,)]
 
 
 def test_a_healthy_machine_keeps_no_effect() -> None:

@@ -259,17 +259,19 @@ class Search:
 
         Where missing sensors leave balances out, what those would show is in the free run alone:
         that is asked too where the others lead nowhere near, and where they are quiet: what acts
-        in a few windows only hardly shows in them.
+        in a few windows only, or hardly more than their noise, does not tell there which it is.
         """
         better = []
         if np.any(self._evidence.fitted):
             found = screen(best.trial, self._sheet, self._head, self.floor)
             better = self._by_balances(found, best)
             near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
-            complete = np.all(self._evidence.told) and (better or not self._quiet(best.trial))
-            if near or complete:
+            told = near or np.all(self._evidence.told)
+            if told and not self._quiet(best.trial):
                 return better
-        return better + self._better(self._on_free_run(best), best)
+        known = [t.trial.effects for t in better]
+        others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
+        return better + self._better(others, best)
 
     def _beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.

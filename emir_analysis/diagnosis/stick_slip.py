@@ -27,15 +27,17 @@ STARTS = 12  # from which the first beginning is fitted at a time ...
 TRIED = 24  # ... and in all, as long as none comes to the noise
 LED = (6, 3)  # of the best, along the next beginnings
 SAME = 1.001  # ratio of the errors of two fits up to which they are the same minimum
-GROWTH = 1.5  # of a beginning from one to the next
-LEAP = 3.0  # the same where the free run follows the machine until then
-FOLLOWS = 1.05  # times the error so far: the most over a longer beginning that it follows
-DRAWN = 3000.0  # s, simulated of machines drawn from what a beginning leaves open ...
+GROWTH = 1.5  # of a beginning from one to the next while several fits are led
+GROWTHS = (3.0, 1.5, 1.2)  # then: the most over which the free run follows the machine
+NEAR_END = 1.1  # times a beginning
+FOLLOWS = 1.02  # times the error so far: the most over a longer beginning that it follows
+DRAWN = 1500.0  # s, simulated of machines drawn from what a beginning leaves open ...
 DRAWN_OF_EACH = 500.0  # s, the same of each while several are led, or where the law is off
+DRAWS = 3  # times that they are drawn, until a fit from the best leaves no more than ...
+AS_BEFORE = 1.01  # times what was left before
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
-ACCURACY = 1e-4  # relative, of the free run's squared error
-ON_THE_WAY = 1e-3  # the same of a beginning from which a longer one goes on
+ACCURACY = 1e-3  # relative, of the free run's squared error
 ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
 
 Method = Callable[[Problem, float], Solution]
@@ -62,7 +64,7 @@ def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
     for count in LED:
         longer = GROWTH * time
         best = _distinct(fits)[:count]
-        points = [_next(start, evidence, each, time, longer, DRAWN_OF_EACH)[1] for each in best]
+        points = [_begin(start, evidence, each, time, longer) for each in best]
         fits = [_fitted(start, evidence.until(longer), x, ROUGH) for x in points]
         time = longer
     return start.continued(_led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit))
@@ -128,32 +130,72 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     known: Trial, evidence: Evidence, x: Array, time: float, end: float, method: Method
 ) -> Solution:
     """Fit to beginnings that grow from a time to another, s."""
-    fitted = _fitted(known, evidence.until(time), x, ON_THE_WAY, method)
+    fitted = _fitted(known, evidence.until(time), x, ACCURACY, method)
     while time < end:
-        # where even what is fitted is not at the noise, the law is off, not one stick
-        seconds = DRAWN if fitted.misfit <= AT_NOISE else DRAWN_OF_EACH
-        time, x = _next(known, evidence, fitted, time, end, seconds)
-        accuracy = ON_THE_WAY if time < end else ACCURACY
-        fitted = _fitted(known, evidence.until(time), x, accuracy, method, fitted.curvature)
+        longer = _followed(known, evidence, fitted, time, end)
+        if longer > time:
+            part = evidence.until(longer)
+            fitted = _fitted(known, part, fitted.x, ACCURACY, method, fitted.curvature)
+        else:
+            longer = _longer(GROWTHS[-1] * time, end)
+            fitted = _found_again(known, evidence.until(longer), fitted, method)
+        time = longer
     return fitted
 
 
-def _next(  # noqa: PLR0913, PLR0917 (as _led)
-    known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float, seconds: float
-) -> tuple[float, Array]:
-    """Return the next beginning's end, s, and from where it is fitted; seconds: to be drawn.
-
-    As long as the instants of sticking are the machine's, a fit goes on from what it knows. Where
-    they are not, it would not find back to them: of machines drawn from what the beginning leaves
-    open one goes on whose instants are (a particle filter's step, Gordon et al. 1993).
-    """
+def _followed(known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float) -> float:
+    """Return until when, s, the free run follows the machine as it does up to a time, s."""
     limit = FOLLOWS * _errors(known, evidence.until(time), fitted.x[None])[0]
-    for growth in (LEAP, GROWTH):
-        longer = min(growth * time, end)
+    for growth in GROWTHS:
+        longer = _longer(growth * time, end)
         if _errors(known, evidence.until(longer), fitted.x[None])[0] < limit:
-            return longer, fitted.x
-    drawn = np.vstack([fitted.x, fitted.drawn(int(seconds / longer))])
-    return longer, drawn[int(np.argmin(_errors(known, evidence.until(longer), drawn)))]
+            return longer
+    return time
+
+
+def _longer(time: float, end: float) -> float:
+    """Return a time, s, or the end, where that is near: it is not worth a fit of its own."""
+    return time if NEAR_END * time < end else end
+
+
+def _found_again(known: Trial, evidence: Evidence, fitted: Solution, method: Method) -> Solution:
+    """Fit to a longer beginning where the machine sticks at other instants than the free run.
+
+    A fit would not find back to them: of machines drawn from what the beginning before leaves
+    open one goes on whose instants are the machine's (a particle filter's step, Gordon et al.
+    1993).
+    """
+    found: list[Solution] = []
+    # where even what is fitted is not at the noise, the law is off, not one stick
+    off = fitted.misfit > AT_NOISE
+    for draw in range(1 if off else DRAWS):
+        x = _drawn(known, evidence, fitted, DRAWN_OF_EACH if off else DRAWN, draw)
+        found.append(_fitted(known, evidence, x, ACCURACY, method, fitted.curvature))
+        if found[-1].misfit <= AS_BEFORE * fitted.misfit:
+            break
+    return min(found, key=lambda each: each.misfit)
+
+
+def _begin(known: Trial, evidence: Evidence, fitted: Solution, time: float, longer: float) -> Array:
+    """Return from where a fit to a longer beginning, s, begins, (k,)."""
+    limit = FOLLOWS * _errors(known, evidence.until(time), fitted.x[None])[0]
+    part = evidence.until(longer)
+    if _errors(known, part, fitted.x[None])[0] < limit:
+        return fitted.x
+    return _drawn(known, part, fitted, DRAWN_OF_EACH)
+
+
+def _drawn(
+    known: Trial, evidence: Evidence, fitted: Solution, seconds: float, draw: int = 0
+) -> Array:
+    """Return the best of machines drawn from what a fit leaves open, (k,), or the fitted one.
+
+    seconds: simulated in all. draw: how often others were drawn before.
+    """
+    count = int(seconds / evidence.duration(1.0))
+    others = fitted.drawn((draw + 1) * count)[draw * count :]
+    points = np.vstack([fitted.x, others])
+    return np.asarray(points[int(np.argmin(_errors(known, evidence, points)))])
 
 
 def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:

@@ -129,24 +129,42 @@ def _at_rest(known: Trial, evidence: Evidence) -> Array:
 def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     known: Trial, evidence: Evidence, x: Array, time: float, end: float, method: Method
 ) -> Solution:
-    """Fit to beginnings that grow from a time to another, s."""
-    fitted = _fitted(known, evidence.until(time), x, ACCURACY, method)
+    """Fit to beginnings that grow from a time to another, s.
+
+    Where the machine sticks at other instants than the free run, a fit would not find back to
+    them: of machines drawn from what the beginning before leaves open one goes on whose instants
+    are the machine's (a particle filter's step, Gordon et al. 1993). Where even that leaves more
+    than before, the law is off, not one stick, and less is spent on it from there on.
+    """
+    fitted, holds = _fitted(known, evidence.until(time), x, ACCURACY, method), True
     while time < end:
-        longer = _followed(known, evidence, fitted, time, end)
+        holds = holds and fitted.misfit <= AT_NOISE
+        growths = GROWTHS if holds else GROWTHS[:-1]
+        longer = _followed(known, evidence, fitted, time, end, growths)
         if longer > time:
             part = evidence.until(longer)
             fitted = _fitted(known, part, fitted.x, ACCURACY, method, fitted.curvature)
         else:
-            longer = _longer(GROWTHS[-1] * time, end)
-            fitted = _found_again(known, evidence.until(longer), fitted, method)
+            longer = _longer(growths[-1] * time, end)
+            before = fitted.misfit
+            draws = DRAWS if holds else 1
+            fitted = _found_again(known, evidence.until(longer), fitted, method, draws)
+            holds = holds and fitted.misfit <= AS_BEFORE * before
         time = longer
     return fitted
 
 
-def _followed(known: Trial, evidence: Evidence, fitted: Solution, time: float, end: float) -> float:
+def _followed(  # noqa: PLR0913, PLR0917 (as _led)
+    known: Trial,
+    evidence: Evidence,
+    fitted: Solution,
+    time: float,
+    end: float,
+    growths: tuple[float, ...],
+) -> float:
     """Return until when, s, the free run follows the machine as it does up to a time, s."""
     limit = FOLLOWS * _errors(known, evidence.until(time), fitted.x[None])[0]
-    for growth in GROWTHS:
+    for growth in growths:
         longer = _longer(growth * time, end)
         if _errors(known, evidence.until(longer), fitted.x[None])[0] < limit:
             return longer
@@ -158,18 +176,13 @@ def _longer(time: float, end: float) -> float:
     return time if NEAR_END * time < end else end
 
 
-def _found_again(known: Trial, evidence: Evidence, fitted: Solution, method: Method) -> Solution:
-    """Fit to a longer beginning where the machine sticks at other instants than the free run.
-
-    A fit would not find back to them: of machines drawn from what the beginning before leaves
-    open one goes on whose instants are the machine's (a particle filter's step, Gordon et al.
-    1993).
-    """
+def _found_again(
+    known: Trial, evidence: Evidence, fitted: Solution, method: Method, draws: int
+) -> Solution:
+    """Return the best fit from the best of some draws of machines, one of which may be enough."""
     found: list[Solution] = []
-    # where even what is fitted is not at the noise, the law is off, not one stick
-    off = fitted.misfit > AT_NOISE
-    for draw in range(1 if off else DRAWS):
-        x = _drawn(known, evidence, fitted, DRAWN_OF_EACH if off else DRAWN, draw)
+    for draw in range(draws):
+        x = _drawn(known, evidence, fitted, DRAWN if draws > 1 else DRAWN_OF_EACH, draw)
         found.append(_fitted(known, evidence, x, ACCURACY, method, fitted.curvature))
         if found[-1].misfit <= AS_BEFORE * fitted.misfit:
             break

@@ -119,22 +119,22 @@ def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
     return start.continued(fit(problem, SCREENING_ACCURACY, robust=True))
 
 
-def fit_free_run(start: Trial, evidence: Evidence, hopeless: float = HOPELESS) -> Trial:
+def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the free run of recordings.
 
     First to their beginning, then further: over a short run parameters that are still off drift
     less, a piston that sticks at another instant does not decide, and it costs less. What shapes
     an effect near standstill, between two windows of the balances, they tell badly: the best of a
-    few such shapes is where the fit begins. A trial that leaves more than `hopeless`, in units of
-    the noise, of the beginning is not polished. The state at rest at each recording's start (see
-    `Starts`) is fitted along and then forgotten: it belongs to the recording, not to the machine.
+    few such shapes is where the fit begins. A trial that cannot follow the beginning is not
+    polished. The state at rest at each recording's start (see `Starts`) is fitted along and then
+    forgotten: it belongs to the recording, not to the machine.
     """
     x = np.append(shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
     begins = [x]
     for share in GROWING:
         begun = fit(free_run_problem(start, evidence, begins[-1], share), ROUGH)
         begins.append(begun.x)
-    accuracy = ACCURACY if begun.misfit < hopeless else HOPELESS_ACCURACY
+    accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
     # what acts late is not told by the beginning, and may have been led astray there
     whole = free_run_problem(start, evidence, x)
     cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)

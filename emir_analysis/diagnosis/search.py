@@ -346,9 +346,7 @@ class Search:
         simulated = []
         for tried in promising:
             self._progress(f"free run: {tried.trial.name}")
-            # what sticks and is off even in the beginning is fitted along a growing one later
-            hopeless = AT_NOISE if sticks(tried.trial) else HOPELESS
-            full = fit_free_run(tried.trial, self._head, hopeless)
+            full = fit_free_run(tried.trial, self._head)
             ways = [full]
             for effect in full.effects:
                 ways += _with_one_size(full, effect)

@@ -25,7 +25,7 @@ from emir_plant.effects import (
 )
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
-from emir_plant.jit import compiled, compiled_parallel
+from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class _Motion(NamedTuple):
     offset_rate: float  # of the piston against the joint, m/s
 
 
-@compiled
+@compiled_in_place
 def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
     angle, tip_angle, turning = 0.0, 0.0, 0.0
@@ -96,7 +96,7 @@ def _motion(x: Array, p: Any) -> _Motion:
     )
 
 
-@compiled
+@compiled_in_place
 def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
     """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
     edges = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
@@ -117,13 +117,13 @@ def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
     return dx
 
 
-@compiled
+@compiled_in_place
 def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Array) -> None:
     """Write dx/dt to dx, (n,), all but the delay line's entries, which stay as they are."""
     write_derivative_of(x, command, parameters[0], dx)
 
 
-@compiled
+@compiled_in_place
 def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
     """As `write_derivative`, with the parameters of one machine."""
     motion = _motion(x, p)
@@ -131,7 +131,7 @@ def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
     _write_rates(x, command, motion, dry, p, dx)
 
 
-@compiled
+@compiled_in_place
 def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
     x: Array, command: float, motion: _Motion, dry: float, p: Any, dx: Array
 ) -> None:
@@ -162,7 +162,7 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     _write_boom(x, motion, dry, p, dx)
 
 
-@compiled
+@compiled_in_place
 def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
     bending = motion.tip_angle - motion.angle
     rate = sensor_delay.rate
@@ -172,7 +172,7 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
     dx[SHOWN_DEFLECTION] = rate(bending, x[SHOWN_DEFLECTION], p.sensor_delay_deflection)
 
 
-@compiled
+@compiled_in_place
 def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> None:
     n = p.mode_joint.size
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
@@ -190,13 +190,13 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
         )
 
 
-@compiled
+@compiled_in_place
 def truth(x: Array, parameters: NDArray[Any]) -> Truth:
     """Return what an ideal observer would read off the state."""
     return truth_of(x, parameters[0])
 
 
-@compiled
+@compiled_in_place
 def truth_of(x: Array, p: Any) -> Truth:
     """As `truth`, with the parameters of one machine."""
     motion = _motion(x, p)
@@ -232,7 +232,7 @@ def step(x: Array, command: float, dt: float, parameters: NDArray[Any]) -> tuple
     return after, truth(after, parameters)
 
 
-@compiled
+@compiled_in_place
 def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
     x: Array, command: float, dt: float, step: float, parameters: NDArray[Any], work: Array
 ) -> None:
@@ -247,7 +247,7 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
             left -= _step(x, arriving, left, h, p, work)
 
 
-@compiled
+@compiled_in_place
 def _step(  # noqa: PLR0913, PLR0917 (as _advance)
     x: Array, command: float, left: float, usual: float, p: Any, work: Array
 ) -> float:
@@ -271,7 +271,7 @@ def _step(  # noqa: PLR0913, PLR0917 (as _advance)
     return h
 
 
-@compiled
+@compiled_in_place
 def remember(x: Array, p: Any) -> None:
     """Put the metering edges to where the spool has pushed them, at the end of a step.
 
@@ -280,7 +280,7 @@ def remember(x: Array, p: Any) -> None:
     x[EDGES] = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
 
 
-@compiled
+@compiled_in_place
 def write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
     """Write x + h rates to result, but for the delay line: `command_delay` alone works on it."""
     for i in range(DELAY_LINE):
@@ -289,7 +289,7 @@ def write_sum(x: Array, h: float, rates: Array, p: Any, result: Array) -> None:
         result[i] = x[i] + h * rates[i]
 
 
-@compiled
+@compiled_in_place
 def advance_by(x: Array, h: float, stages: Array, p: Any) -> None:
     """Advance x in place by a step h, s, of Runge-Kutta 4 with the rates of its stages, (4+, n)."""
     k1, k2, k3, k4 = stages[0], stages[1], stages[2], stages[3]
@@ -299,7 +299,7 @@ def advance_by(x: Array, h: float, stages: Array, p: Any) -> None:
         x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
-@compiled
+@compiled_in_place
 def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
     x: Array, command: float, left: float, usual: float, p: Any, dx: Array
 ) -> dry_friction.Friction:
@@ -329,7 +329,7 @@ def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
     return dry
 
 
-@compiled
+@compiled_in_place
 def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
     """Return the piston's amplitude in the fastest mode, m/s.
 
@@ -343,7 +343,7 @@ def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
     return abs(moved) * amplitude
 
 
-@compiled
+@compiled_in_place
 def _write_later_rates(
     x: Array, command: float, dry: dry_friction.Friction, p: Any, dx: Array
 ) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from emir_plant import core
 from emir_plant.core import DELAY_LINE, MODES, P_S, STEP, Array, Truth
-from emir_plant.jit import compiled, compiled_parallel
+from emir_plant.jit import compiled_in_place, compiled_parallel
 from emir_plant.lane import lane
 from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
 
@@ -58,14 +58,14 @@ def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
     return machines
 
 
-@compiled
+@compiled_in_place
 def _write_rates(machines: Any, x: Array, command: float, dx: Array) -> None:
     for i in range(LANES):
         p = lane(machines, i)
         core.write_derivative_of(x[i::LANES], command, p, dx[i::LANES])
 
 
-@compiled
+@compiled_in_place
 def _write_sum(x: Array, h: float, rates: Array, result: Array) -> None:
     """Write x + h rates to result, but for the delay line, which is empty."""
     for i in range(DELAY_LINE * LANES):
@@ -75,7 +75,7 @@ def _write_sum(x: Array, h: float, rates: Array, result: Array) -> None:
         result[i] = x[i] + h * rates[i]
 
 
-@compiled
+@compiled_in_place
 def _step(m: Any, command: float, h: float) -> None:
     """Advance the machines m by one step of Runge-Kutta 4, as `core` does without friction."""
     x, k1, k2, k3, k4, between = m.state, m.k1, m.k2, m.k3, m.k4, m.between

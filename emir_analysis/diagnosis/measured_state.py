@@ -21,7 +21,7 @@ from emir_analysis.signals import Array
 from emir_plant import core
 from emir_plant.effects import command_delay, linkage_error, terms
 from emir_plant.hydraulics import chambers
-from emir_plant.jit import compiled, compiled_parallel
+from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
 
 
 class Modelled(NamedTuple):
@@ -34,7 +34,7 @@ class Modelled(NamedTuple):
     deflection: Array  # alpha_6 - alpha_1, rad
 
 
-@compiled
+@compiled_in_place
 def _write_rates(x: Array, command: float, measured: Array, p: Any, dx: Array) -> None:
     """Put the measured values into the state x and write its rates to dx.
 
@@ -51,7 +51,7 @@ def _write_rates(x: Array, command: float, measured: Array, p: Any, dx: Array) -
     core.write_derivative_of(x, command, p, dx)
 
 
-@compiled
+@compiled_in_place
 def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
     x: Array, command: float, dt: float, measured: Array, p: Any, work: Array
 ) -> None:
@@ -68,7 +68,7 @@ def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them
     core.remember(x, p)
 
 
-@compiled
+@compiled_in_place
 def _swept(turned: float, measured: Array, p: Any) -> tuple[float, float]:
     """Return the changes of p_H and p_S, Pa, that a small turn of the boom, rad, makes."""
     stroke = linkage_error.stroke(measured[2], p)
@@ -82,7 +82,7 @@ def _swept(turned: float, measured: Array, p: Any) -> tuple[float, float]:
     return lifting, lowering
 
 
-@compiled
+@compiled_in_place
 def _mean_rate(work: Array, i: int) -> float:
     """Return the mean rate of a state over the last step."""
     total: float = work[0, i] + 2.0 * (work[1, i] + work[2, i]) + work[3, i]

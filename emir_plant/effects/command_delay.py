@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
-from emir_plant.jit import compiled
+from emir_plant.jit import compiled, compiled_in_place
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def empty_line() -> Array:
     return line
 
 
-@compiled
+@compiled_in_place
 def arriving(line: Array, command: float, now: float, step: float, p: Any) -> float:
     """Return the mean command at the valve from now, s, over a step, s; update the line."""
     delay = p.command_delay_delay
@@ -63,7 +63,7 @@ def arriving(line: Array, command: float, now: float, step: float, p: Any) -> fl
     return (_integral(line, end - delay, end) - _integral(line, now - delay, end)) / step
 
 
-@compiled
+@compiled_in_place
 def _integral(line: Array, time: float, end: float) -> float:
     """Return the command's integral up to a time, s, the line being known up to its end, s."""
     later_time, later = end, line[INTEGRAL]

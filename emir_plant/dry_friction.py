@@ -20,11 +20,12 @@ from emir_plant.jit import compiled
 
 SHORTEST = 0.125  # of the fine step
 CHANGE = 0.12  # m/s^2, of the velocity by the change of friction, per fine step: 3e-5 m/s
-GENTLE = 0.5  # share of the change of velocity, below which a step of Runge-Kutta is accurate
+GENTLE = 0.5  # share of the change of velocity under the friction of the start, below which a
+# step of Runge-Kutta is accurate
 SWING = 2e-4  # m/s, amplitude of the piston in the fastest mode from which on steps are shorter:
 # the phase that is lost in it adds up over seconds and shifts the instants of sticking
 EVEN = 2.0  # fine steps where the friction stays the same all over that swing
-ITERATIONS = 60  # of the search; it takes about three
+ITERATIONS = 60  # of the search; it takes about six
 TOLERANCE = 1e-9  # m/s
 
 
@@ -59,13 +60,13 @@ def over_step(piston: Piston, left: float, usual: float, fine: float, p: Any) ->
     """
     step = min(left, _following(piston, usual, fine, p))
     while True:
-        end = piston.velocity + step * piston.acceleration
-        after = at_end(piston, end, step * piston.mobility, p)
-        change = step * piston.mobility * abs(after - piston.friction)
-        moved = step * abs(piston.acceleration - piston.mobility * after)
-        gentle = change <= GENTLE * moved or change == 0.0
-        if gentle:
+        unhindered, mobility = piston.velocity + step * piston.acceleration, step * piston.mobility
+        straight = unhindered - mobility * piston.friction
+        change = mobility * abs(terms.dry_friction(straight, piston.load, p) - piston.friction)
+        if change <= GENTLE * abs(straight - piston.velocity):
             return Friction(step, piston.friction, False)
+        after = at_end(unhindered, mobility, piston.load, p)
+        change = mobility * abs(after - piston.friction)
         if change <= CHANGE * fine or step <= SHORTEST * fine:
             return Friction(step, after, True)
         step *= 0.5
@@ -84,22 +85,22 @@ def _following(piston: Piston, usual: float, fine: float, p: Any) -> float:
 
 
 @compiled
-def at_end(piston: Piston, unhindered: float, mobility: float, p: Any) -> float:
+def at_end(unhindered: float, mobility: float, load: float, p: Any) -> float:
     """Return the dry friction, N, at the end of a step.
 
     unhindered: velocity at the end of the step without it, m/s. mobility: step over mass,
-    m/(s N). The velocity is looked for between 0 and unhindered by the Illinois method, first
-    where the friction at the step's start leads.
+    m/(s N). load: force of the oil on the piston, N. The velocity is looked for between 0 and
+    unhindered by the Illinois method, first where the friction of sliding unhindered leads.
     """
     low, at_low = 0.0, -unhindered
-    high, at_high = unhindered, mobility * terms.dry_friction(unhindered, piston.load, p)
+    high, at_high = unhindered, mobility * terms.dry_friction(unhindered, load, p)
     if at_high == 0.0:
         return 0.0
-    velocity, side = unhindered - mobility * piston.friction, 0
-    if velocity * (unhindered - velocity) <= 0.0:
+    velocity, side = unhindered - at_high, 0
+    if velocity * unhindered <= 0.0:
         velocity = _between(low, at_low, high, at_high)
     for _ in range(ITERATIONS):
-        missing = velocity + mobility * terms.dry_friction(velocity, piston.load, p) - unhindered
+        missing = velocity + mobility * terms.dry_friction(velocity, load, p) - unhindered
         if abs(missing) <= TOLERANCE:
             break
         if missing * at_high > 0.0:

@@ -92,9 +92,10 @@ def test_node_starts_and_stops(
     if name == "recorder_node":
         command += ["--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
     said = tmp_path / "said"
+    traced = os.environ | {"PYTHONFAULTHANDLER": "1"}  # says where, should one ever crash
     with (
         said.open("w") as output,
-        subprocess.Popen(command, stdout=output, stderr=output, text=True) as process,
+        subprocess.Popen(command, stdout=output, stderr=output, text=True, env=traced) as process,
     ):
         try:
             wait_until_seen(observer, name, process)

@@ -191,11 +191,9 @@ def _found_again(
 
 def _begin(known: Trial, evidence: Evidence, fitted: Solution, time: float, longer: float) -> Array:
     """Return from where a fit to a longer beginning, s, begins, (k,)."""
-    limit = FOLLOWS * _errors(known, evidence.until(time), fitted.x[None])[0]
-    part = evidence.until(longer)
-    if _errors(known, part, fitted.x[None])[0] < limit:
+    if _followed(known, evidence, fitted, time, longer, (GROWTH,)) > time:
         return fitted.x
-    return _drawn(known, part, fitted, DRAWN_OF_EACH)
+    return _drawn(known, evidence.until(longer), fitted, DRAWN_OF_EACH)
 
 
 def _drawn(

@@ -2,7 +2,10 @@
 
 import numpy as np
 
+from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
@@ -42,11 +45,16 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     return found
 
 
-def viscous_force(known: Trial, velocity: float) -> float:
-    """Return a trial's viscous friction, N, at a velocity, m/s; inf where it has none."""
+def viscous_is_heard(known: Trial, evidence: Evidence, floor: Array) -> bool:
+    """Tell whether a trial's viscous friction at the fastest is above the force balance's noise.
+
+    floor: (5,) what the sensors leave in each balance.
+    """
     if VISCOUS not in known.effects:
-        return np.inf
-    return known.machine.effects.viscous_friction.coefficient * velocity
+        return False
+    _, velocity = evidence.signals()["piston_velocity"]
+    fastest = float(np.max(np.abs(velocity)))
+    return known.machine.effects.viscous_friction.coefficient * fastest >= float(floor[FORCE])
 
 
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:

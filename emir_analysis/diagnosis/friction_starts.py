@@ -2,7 +2,8 @@
 
 The balances' windows tell how much friction there is, but hardly how it falls behind the
 break-away: that lies between two of them. With a shape given, how much it is and what else is
-fitted is a nearly linear problem, and the whole recordings answer it.
+fitted is a nearly linear problem, and the whole recordings answer it. Its weak point is how much
+of the friction is viscous, which a wrong shape makes up for: each shape also begins without.
 """
 
 from itertools import product
@@ -13,6 +14,7 @@ from scipy.optimize import least_squares
 from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD
+from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.signals import Array
 
 SHAPES = {  # that are tried in all combinations
@@ -38,7 +40,10 @@ def friction_starts(start: Trial, evidence: Evidence, floor: Array, first: float
 
 
 def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
-    """Return vectors, (m, k), of all shapes with what else the balances say beside each."""
+    """Return vectors, (m, k), of all shapes with what else the balances say beside each.
+
+    Each with viscous friction and, where that is heard, without.
+    """
 
     def missing(points: Array) -> Array:
         left = evidence.residuals([start.unknowns.at(x) for x in points]) / floor
@@ -62,9 +67,15 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
     sliding = missing(points + size[dry])
     acting = np.vstack([acting, flowing - without])
     free = np.array([*others, viscous, dry])
+    dry_alone = free[free != viscous]
+    found = []
     for point, own in zip(points, sliding - without, strict=True):
-        point[free] = _least(start, point, free, without, np.vstack([acting, own]))
-    return points
+        slopes = np.vstack([acting, own])
+        begun = _least(start, point, free, without, slopes)
+        found.append(begun)
+        if viscous_is_heard(start.at(begun), evidence, floor):
+            found.append(_least(start, point, dry_alone, without, slopes[free != viscous]))
+    return np.array(found)
 
 
 def _grid(start: Trial) -> Array:
@@ -75,7 +86,7 @@ def _grid(start: Trial) -> Array:
 
 
 def _least(start: Trial, point: Array, free: Array, left: Array, slopes: Array) -> Array:
-    """Return the free unknowns, (f,), that leave least of a linear model.
+    """Return the point, (k,), with those free unknowns, (f,), that leave least of a linear model.
 
     left: (n,) at the point, slopes: (f, n). Each of the maker's is held to what he states.
     """
@@ -91,4 +102,6 @@ def _least(start: Trial, point: Array, free: Array, left: Array, slopes: Array) 
 
     begin = np.clip(origin, low + INSIDE, high - INSIDE)
     found = least_squares(residuals, begin, jacobian, bounds=(low, high), loss="soft_l1")
-    return np.asarray(found.x)
+    moved = point.copy()
+    moved[free] = found.x
+    return moved

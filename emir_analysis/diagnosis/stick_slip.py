@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
-from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_force
+from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_is_heard
 from emir_analysis.diagnosis.friction_starts import friction_starts
 from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, STRONG, score
 from emir_analysis.signals import Array
@@ -90,8 +90,7 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
     begin = evidence.until(DECIDED)
     _, misfit = _further(known, begin)
     limit = _score(misfit, known, begin) + STRONG
-    _, velocity = evidence.signals()["piston_velocity"]
-    unheard = viscous_force(known, float(np.max(np.abs(velocity)))) < floor[FORCE]
+    unheard = not viscous_is_heard(known, evidence, floor)
     laws, fewer = [known], simpler(known, sheet)
     while fewer:
         fitted, left = _further(fewer.pop(0), begin)

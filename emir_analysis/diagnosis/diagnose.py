@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, free_run_errors
+from emir_analysis.diagnosis.candidates import Trial, fit_balances
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.search import Progress, Search, Tried
-from emir_analysis.diagnosis.select import explained, limits, quiet
+from emir_analysis.diagnosis.select import limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
@@ -54,7 +55,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if final.effects:
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
     good = quiet(level(after), limits(final.machine, evidence))
-    good = good and explained(free_run_errors(final.machine, evidence))
+    good = good and explained(final, evidence)
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
         refitted = final = search.whole(final)

@@ -15,9 +15,10 @@ from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
+from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.free_run import block_medians, rms
+from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
-from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statistics import (
     Interval,
@@ -237,22 +238,35 @@ def _statement(findings: Findings) -> str:
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
-    return names + (f"; {remainder}" if remainder else "")
+    return names + (f"; {remainder}" if remainder else "") + _unforeseeable(findings)
 
 
-def _surprised(judged: Judged) -> bool:
+def _unforeseeable(findings: Findings) -> str:
+    """Return that no model follows a machine to the end, where what no sensor tells decides."""
+    if not sticks(findings.chosen):
+        return ""
+    apart = math.sqrt(2.0 * parting(findings.chosen.machine, findings.evidence))
+    if apart <= 1.0:
+        return ""
+    return (
+        f"; it cannot be foreseen to the end: where it sticks, two of its runs that begin within a"
+        f" step of the resolver part by {apart:.1f} times the noise"
+    )
+
+
+def _surprised(findings: Findings, judged: Judged) -> bool:
     """Tell whether the judge recordings show what the model does not explain."""
-    return not judged.off(STAGES[-1]) <= EXPLAINED
+    return not explained(findings.chosen, judged.evidence)
 
 
 def _verdict(findings: Findings, judged: Judged) -> str:
-    if findings.verdict == "nothing_missing" and _surprised(judged):
+    if findings.verdict == "nothing_missing" and _surprised(findings, judged):
         return "unexplained"
     return findings.verdict
 
 
 def _judgement(findings: Findings, judged: Judged) -> str:
-    if findings.verdict == "unexplained" or not _surprised(judged):
+    if findings.verdict == "unexplained" or not _surprised(findings, judged):
         return ""
     off, judge = judged.off(STAGES[-1]), _names(judged.evidence)
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"

@@ -17,6 +17,7 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
+from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
@@ -28,7 +29,6 @@ from emir_analysis.diagnosis.select import (
     at_noise,
     balance_score,
     excess,
-    explained,
     free_run_score,
     limits,
     quiet,
@@ -367,7 +367,7 @@ class Search:
 
     def _enough(self, tried: Trial) -> bool:
         """Tell whether a trial leaves no balance speaking and explains the free run."""
-        return self._quiet(tried) and explained(free_run_errors(tried.machine, self._evidence))
+        return self._quiet(tried) and explained(tried, self._evidence)
 
     def _quiet(self, tried: Trial) -> bool:
         left = level(self._evidence.residuals([tried.machine])[0])

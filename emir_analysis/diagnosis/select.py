@@ -101,11 +101,6 @@ def quiet(left: Array, limit: Array) -> bool:
     return not np.any(left > limit)
 
 
-def explained(errors: list[Array]) -> bool:
-    """Tell whether a free run explains its recordings: all signals together, in their noise."""
-    return bool(np.sqrt(np.mean(np.concatenate(errors) ** 2)) <= EXPLAINED)
-
-
 def excess(tried: Trial, evidence: Evidence) -> float:
     """Return the mean square of all signals' free-run errors beyond the noise, in its units.
 

@@ -6,6 +6,7 @@ fitted is a nearly linear problem, and the whole recordings answer it. Its weak 
 of the friction is viscous, which a wrong shape makes up for: each shape also begins without.
 """
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -52,30 +53,30 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
     paths = [unknown.path for unknown in start.unknowns.members]
     shaping, dry, viscous = [paths.index(p) for p in SHAPES], paths.index(DRY), paths.index(VISCOUS)
     others = [k for k in range(len(paths)) if k not in (*shaping, dry, viscous)]
-    # how the others act depends little on the friction: found once
-    _, high = start.unknowns.bounds
-    steps = np.where(start.x + STEP > high, -STEP, STEP)
-    values = missing(np.vstack([start.x, start.x + np.diag(steps)[others]]))
-    acting = (values[1:] - values[0]) / steps[others, None]
-    shapes = _grid(start)
+    shapes, size = _grid(start), np.eye(start.x.size)
     points = np.tile(start.x, (len(shapes), 1))
     points[:, shaping] = shapes
     points[:, [dry, viscous]] = 0.0
-    size = np.eye(start.x.size)
     # without dry friction its shape makes no difference
     without, flowing = missing(points[0] + np.outer([0.0, 1.0], size[viscous]))
-    sliding = missing(points + size[dry])
-    acting = np.vstack([acting, flowing - without])
+    acting = np.vstack([_acting(start, others, missing), flowing - without])
     free = np.array([*others, viscous, dry])
-    dry_alone = free[free != viscous]
+    still = free != viscous
     found = []
-    for point, own in zip(points, sliding - without, strict=True):
-        slopes = np.vstack([acting, own])
-        begun = _least(start, point, free, without, slopes)
-        found.append(begun)
-        if viscous_is_heard(start.at(begun), evidence, floor):
-            found.append(_least(start, point, dry_alone, without, slopes[free != viscous]))
+    for point, sliding in zip(points, missing(points + size[dry]), strict=True):
+        slopes = np.vstack([acting, sliding - without])
+        found.append(_least(start, point, free, without, slopes))
+        if viscous_is_heard(start.at(found[-1]), evidence, floor):
+            found.append(_least(start, point, free[still], without, slopes[still]))
     return np.array(found)
+
+
+def _acting(start: Trial, others: list[int], missing: Callable[[Array], Array]) -> Array:
+    """Return how those unknowns act on what is missing, (o, n): found once for all friction."""
+    _, high = start.unknowns.bounds
+    steps = np.where(start.x + STEP > high, -STEP, STEP)
+    values = missing(np.vstack([start.x, start.x + np.diag(steps)[others]]))
+    return np.asarray((values[1:] - values[0]) / steps[others, None])
 
 
 def _grid(start: Trial) -> Array:

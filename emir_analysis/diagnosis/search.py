@@ -339,23 +339,31 @@ class Search:
         return ahead
 
     def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
-        """Fit trials to the free run; return those that are better than the best so far.
-
-        Of several sizes of an effect one alone is taken where the others are not worth their while.
-        """
+        """Fit trials to the free run; return those that are better than the best so far."""
         simulated = []
         for tried in promising:
             self._progress(f"free run: {tried.trial.name}")
-            full = fit_free_run(tried.trial, self._head)
-            ways = [full]
-            for effect in full.effects:
-                ways += _with_one_size(full, effect)
-            scores = [free_run_score(way, self._evidence) for way in ways]
-            best_way = int(np.argmin(scores))
-            simulated.append(Tried(ways[best_way], tried.balances, scores[best_way]))
+            simulated.append(self._simulated(tried))
         self.tried += simulated
         better = [t for t in simulated if _free(t) < _free(best) - STRONG]
         return better or [t for t in simulated if self._suffices(t.trial, best.trial)]
+
+    def _simulated(self, tried: Tried) -> Tried:
+        """Return a trial fitted to the free run.
+
+        Of several sizes of an effect one alone is taken where the others are not worth their while.
+        Where all that leads nowhere near, what else is missing drives the free run away and the
+        parameters with it: they stay as the balances say, if those are all told.
+        """
+        full = fit_free_run(tried.trial, self._head)
+        if np.all(self._evidence.told) and excess(full, self._head) > HOPELESS**2 - 1.0:
+            return replace(tried, free_run=free_run_score(full, self._evidence))
+        ways = [full]
+        for effect in full.effects:
+            ways += _with_one_size(full, effect)
+        scores = [free_run_score(way, self._evidence) for way in ways]
+        best_way = int(np.argmin(scores))
+        return Tried(ways[best_way], tried.balances, scores[best_way])
 
     def _suffices(self, tried: Trial, best: Trial) -> bool:
         """Tell whether the whole recordings need no more than a trial, and that far more than best.

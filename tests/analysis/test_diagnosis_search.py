@@ -223,3 +223,22 @@ def test_a_late_command_is_simpler_than_four_late_sensors(
 def test_a_healthy_machine_keeps_no_effect() -> None:
     begun = search({})
     assert begun[0].needed(fitted(begun, "viscous_friction")).effects == ()
+
+
+def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_away() -> None:
+    """Soft hoses on a valve that lowers a tenth slower: fitted to the free run alone they are off.
+
+    What is looked for beside them is then looked for beside the right ones.
+    """
+    hidden = {
+        "effects.vessel_compliance.lifting": 3.1e-11,
+        "effects.vessel_compliance.lowering": 9.3e-11,
+        "effects.valve_gain_asymmetry.lowering": -0.1,
+    }
+    long = run(with_values(joint1(), hidden), duration=24.0)
+    searched, _, _ = search({}, lambda _: long)
+    found = searched.run()
+    assert [t.effects for t in found] == [("vessel_compliance", "valve_gain_asymmetry")]
+    hoses = next(t.trial for t in searched.tried if t.trial.effects == ("vessel_compliance",))
+    lowering = hoses.machine.effects.vessel_compliance.lowering
+    assert lowering == pytest.approx(9.3e-11, rel=0.06)

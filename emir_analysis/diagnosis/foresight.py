@@ -36,7 +36,7 @@ def explained(known: Trial, evidence: Evidence) -> bool:
 
 @lru_cache(maxsize=4)  # asked again for the verdict
 def parting(machine: Machine, evidence: Evidence) -> float:
-    """Return the variance, in units of the noise, among free runs that differ in their start.
+    """Return the variance, in squares of the noise, among free runs that differ in their start.
 
     More than in the first DECIDED seconds: what the start itself makes stays as it is.
     """
@@ -49,7 +49,7 @@ def parting(machine: Machine, evidence: Evidence) -> float:
 
 
 def _apart(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
-    """Return the variance of the shown signals among the runs, (n, c), in units of the noise."""
+    """Return the variance of the shown signals among the runs, (n, c), in squares of the noise."""
     angle, pressure = at_rest(machine, experiment, evidence)
     sensors = evidence.stated.sensors
     half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits

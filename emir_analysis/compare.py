@@ -84,7 +84,7 @@ def repeated(
     Each has another sensor noise and starts elsewhere within one step of the resolver.
     """
     sensors = machine.sensors
-    step = sensors.resolver_span / 2.0**sensors.resolver_bits
+    step = sensors.resolver_step
     for k in range(count):
         other = with_values(machine, {"sensors.seed": sensors.seed + k})
         yield run(other, trajectory, outer, angle + step * k / count)

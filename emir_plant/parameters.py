@@ -108,6 +108,11 @@ class Sensors:
     deflection_noise: float = quantity("rad", 0.0, 1e-2, "standard deviation")
     seed: int = quantity("1", 0, 2**31 - 1, "of the noise", default=0)
 
+    @property
+    def resolver_step(self) -> float:
+        """Angle, rad, between two counts of the resolver."""
+        return self.resolver_span / 2.0**self.resolver_bits
+
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:

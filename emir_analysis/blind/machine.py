@@ -25,6 +25,9 @@ RELATIVE = 1e-8  # accuracy of the integration
 ABSOLUTE = (1.0, 1.0, 1e-6, 1e-4, 1e-6)  # of the hydraulic states; Pa, Pa, 1, 1/s, 1
 ABSOLUTE_MODES = 1e-5  # sqrt(kg) m: 1e-8 rad of the joint
 ABSOLUTE_MEMORY = 1e-9
+SETTLING = 1000  # steps until a boom that bends by no straight law is at rest
+SETTLED_BY = 0.3  # of what a straight one would give way, in each of them
+AT_REST = 1e-9  # of the largest force on a mode
 
 
 class NotSolvedError(RuntimeError):
@@ -87,9 +90,22 @@ class Machine:
         """Return a force across the boom at the TCP, N, up positive."""
         return 0.0
 
+    def weight(self, time: float, angle: float) -> Array:
+        """Return what gravity takes from each mode's force, at the boom angle, rad."""
+        return self.boom.weight * math.cos(angle)
+
     def bending(self, position: Array, rate: Array) -> Array:
         """Return the boom's own generalised forces."""
         return -self.boom.stiffness * position - self.boom.damping * rate
+
+    def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        """Return those of the modes; push: force on the joint along the cylinder, N."""
+        b = self.boom
+        half = HYDRAULIC + b.joint.size
+        forces = self.bending(x[HYDRAULIC:half], x[half : self.modes.stop])
+        forces += b.joint * (push * self.lever_arm(angle)) - self.weight(time, angle)
+        load = self.tip_force(time)
+        return forces + b.tip * load if load else forces
 
     def stiffness(self, pressure: float, volume: float, *, lifting: bool) -> float:
         """Return the stiffness of a chamber's content, Pa."""
@@ -102,6 +118,14 @@ class Machine:
     def supply(self, time: float, x: list[float]) -> float:
         """Return the pressure at the pump, Pa."""
         return self.n.p0
+
+    def pumped(self, wanted: float, drop: float) -> float:
+        """Return the pump's flow, m^3/s, where one is wanted and a pressure, Pa, drives it."""
+        n = self.n
+        if drop <= 0.0:
+            return 0.0  # check valve
+        path = n.k_pump_line + n.k_block_in + n.balance_pressure / (wanted * wanted)
+        return min(wanted, _orifice(drop, path))
 
     def acceleration(self, command: float, spool: float, rate: float) -> float:
         """Return the spool's acceleration, 1/s^2."""
@@ -159,35 +183,41 @@ class Machine:
         n = self.n
         square = opening * opening
         if opening > 0.0:
-            pumped = self._pumped(opening * n.flow_nominal, supply - p_h)
+            pumped = self.pumped(opening * n.flow_nominal, supply - p_h)
             back = _orifice(p_s - n.pT, n.k_meter_out_lifting / square + n.k_return_line)
             return pumped, -back, pumped
         if opening < 0.0:
-            pumped = self._pumped(-opening * n.flow_nominal * n.flow_ratio_lowering, supply - p_s)
+            pumped = self.pumped(-opening * n.flow_nominal * n.flow_ratio_lowering, supply - p_s)
             block = n.k_block_out / max(logic * logic, 1e-12)
             back = _orifice(p_h - n.pT, n.k_meter_out_lowering / square + n.k_return_line + block)
             return -back, pumped, pumped
         return 0.0, 0.0, 0.0
 
-    def _pumped(self, wanted: float, drop: float) -> float:
-        n = self.n
-        if drop <= 0.0:
-            return 0.0  # check valve
-        path = n.k_pump_line + n.k_block_in + n.balance_pressure / (wanted * wanted)
-        return min(wanted, _orifice(drop, path))
-
     def start(self, angle: float, p_s: float) -> Array:
         """Return the state at rest at a boom angle, rad, with both chambers shut."""
         b, n = self.boom, self.n
-        across = b.tip * self.tip_force(0.0) - b.weight * math.cos(angle)
+        across = b.tip * self.tip_force(0.0) - self.weight(0.0, angle)
         torque = -across[0] / b.joint[0]
-        bent = np.zeros(b.joint.size)
-        bent[1:] = (across + b.joint * torque)[1:] / b.stiffness[1:]
+        bent = self._bent(across + b.joint * torque)
         bent[0] = (angle - b.joint @ bent) / b.joint[0]
-        p_h = (torque / self.lever_arm(angle) + p_s * n.area_lowering) / n.area_lifting
+        beside = self.resistance(0.0, torque / self.lever_arm(angle), self.stroke(angle))
+        force = torque / self.lever_arm(angle) + beside
+        p_h = (force + p_s * n.area_lowering) / n.area_lifting
         opened = float(self.pilot(p_h, p_s) > n.threshold)
         x = [p_h, p_s, 0.0, 0.0, opened, *bent.tolist(), *([0.0] * bent.size)]
         return np.array(x + self.start_memory(angle, x))
+
+    def _bent(self, load: Array) -> Array:
+        """Return the modes' positions, the rigid one 0, at rest under forces on each, (m,)."""
+        stiffness, still = self.boom.stiffness, np.zeros(load.size)
+        bent = still.copy()
+        bent[1:] = load[1:] / stiffness[1:]
+        for _ in range(SETTLING):
+            left = load + self.bending(bent, still)
+            if np.all(np.abs(left[1:]) <= AT_REST * np.abs(load).max()):
+                return bent
+            bent[1:] += SETTLED_BY * left[1:] / stiffness[1:]
+        raise NotSolvedError(f"{type(self).__name__}: the boom bends without end")
 
     def rates(self, x: Array, time: float, command: float) -> Array:
         """Return dx/dt."""
@@ -220,7 +250,7 @@ class Machine:
         half = HYDRAULIC + modes.size // 2
         dx[HYDRAULIC:half] = x[half : self.modes.stop]
         push = now["force"] - self.resistance(velocity, now["force"], stroke)
-        dx[half : self.modes.stop] = self._accelerations(x, time, angle, push)
+        dx[half : self.modes.stop] = self.accelerations(x, time, angle, push)
         dx[self.modes.stop :] = remembered
         return dx
 
@@ -239,15 +269,6 @@ class Machine:
         if pilot > self.n.threshold:
             return (1.0 - opened) / self.n.time_constant_opening
         return -opened / self.n.time_constant_closing
-
-    def _accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
-        """Return those of the modes; push: force on the joint along the cylinder, N."""
-        b = self.boom
-        half = HYDRAULIC + b.joint.size
-        forces = self.bending(x[HYDRAULIC:half], x[half : self.modes.stop])
-        forces += b.joint * (push * self.lever_arm(angle)) - b.weight * math.cos(angle)
-        load = self.tip_force(time)
-        return forces + b.tip * load if load else forces
 
     def run(self, x: Array, times: Array, command: float) -> Array:
         """Return the states at times, (n, s), the first of which is the start, under a command.

@@ -284,7 +284,7 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
     angle, pressure = experiment.start()
     pressure = machine.supply.pT if np.isnan(pressure) else pressure
     draws = max(1, round(DRAWN / float(experiment.time[-1])))
-    step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
+    step = machine.sensors.resolver_step
     inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
     ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])
     if not np.all(np.isfinite(ideal)):

@@ -243,7 +243,7 @@ class Starts:
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
         sensors = evidence.stated.sensors
         angle, pressure = experiment.start()
-        half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
+        half_step = 0.5 * sensors.resolver_step
         half_range = 2.0 * sensors.pressure_noise
         if np.isnan(pressure):
             low, high = _resting_pressures(evidence.stated, angle)

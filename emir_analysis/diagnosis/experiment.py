@@ -186,7 +186,7 @@ def noise(machine: Machine) -> Array:
     angle of 45 deg.
     """
     sensors = machine.sensors
-    step = sensors.resolver_span / 2**sensors.resolver_bits
+    step = sensors.resolver_step
     arm = linkage.lever_arm(np.pi / 4.0, record(machine)[0])
     return np.array(
         [

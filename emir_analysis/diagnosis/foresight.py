@@ -52,7 +52,7 @@ def _apart(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arra
     """Return the variance of the shown signals among the runs, (n, c), in squares of the noise."""
     angle, pressure = at_rest(machine, experiment, evidence)
     sensors = evidence.stated.sensors
-    half_step = 0.5 * sensors.resolver_span / 2**sensors.resolver_bits
+    half_step = 0.5 * sensors.resolver_step
     starts = [(angle + half_step * start, pressure) for start in STARTS]
     runs = free_runs([machine] * len(starts), experiment, starts)[:, :, ANGLE + 1 :]
     return np.asarray(np.var(runs / evidence.sensors, axis=0)[:, evidence.shown])

@@ -32,7 +32,7 @@ def check_sampling(name: str, signal: Signal) -> None:
 
 def check_motion(name: str, angle: Array, machine: Machine) -> None:
     """Raise InputError where the boom never moves."""
-    step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
+    step = machine.sensors.resolver_step
     if np.ptp(angle) < LEAST_MOTION * step:
         raise InputError(
             f"{name}: never moves (the angle stays within {np.ptp(angle):.2g} rad);"

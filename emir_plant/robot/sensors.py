@@ -33,7 +33,7 @@ def measure(plant: RobotPlant, truth: RobotTruth, sample: int) -> RobotMeasureme
     """
     sensors, drives = plant.robot.main.sensors, plant.tables.drives
     noise = generator(sensors.seed, sample).standard_normal((2, ACTUATORS))
-    step = sensors.resolver_span / 2.0**sensors.resolver_bits
+    step = sensors.resolver_step
     angle = np.floor(truth.angle / step + 0.5) * step
     strokes = [
         linkage.stroke(a, p) for a, p in zip(angle[1:], plant.mechanics.linkages, strict=True)

@@ -15,6 +15,7 @@ from emir_analysis.blind.boom import boom
 from emir_analysis.blind.machine import Machine
 from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
 from emir_analysis.blind.recording import Run, Start, repeated
+from emir_analysis.blind.trial import foreign_effects
 from emir_common.parameter_tree import with_values
 from emir_plant.boom import boom_modes
 from emir_plant.plant import Plant
@@ -186,3 +187,14 @@ def test_any_two_effects_go_together_in_either_order() -> None:
         machine = both(STATED, one.draw(random) | other.draw(random))
         x = machine.start(START.angle, START.p_s)
         assert np.isfinite(machine.rates(x, 0.0, 0.0)).all(), (one.name, other.name)
+
+
+@pytest.mark.parametrize("file", ["foreign.py", "foreign_more.py"])
+def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
+    source = (Path(__file__).parent / file).read_text()
+    for effect in foreign_effects(source):
+        machine = effect(STATED, effect.drawn(np.random.default_rng(1), STATED))
+        rates = machine.rates(machine.start(START.angle, START.p_s), 0.0, 0.0)
+        still = np.abs(rates[machine.modes]) < 1e-6 * np.abs(machine.boom.weight).max()
+        assert np.all(still), effect.name
+        assert np.all(rates[:2] == 0.0), effect.name

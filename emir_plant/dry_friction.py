@@ -25,7 +25,7 @@ GENTLE = 0.5  # share of the change of velocity under the friction of the start,
 SWING = 2e-4  # m/s, amplitude of the piston in the fastest mode from which on steps are shorter:
 # the phase that is lost in it adds up over seconds and shifts the instants of sticking
 EVEN = 2.0  # fine steps where the friction stays the same all over that swing
-ITERATIONS = 60  # of the search; it takes about six
+ITERATIONS = 60  # of the search; it takes about three
 TOLERANCE = 1e-9  # m/s
 
 
@@ -38,6 +38,15 @@ class Piston(NamedTuple):
     load: float  # force of the oil, N
     friction: float  # dry, N
     swing: float  # amplitude in the boom's fastest mode, m/s
+
+
+class Ends(NamedTuple):
+    """Two velocities, m/s, and by how much each is off, m/s, with different signs."""
+
+    low: float
+    at_low: float
+    high: float
+    at_high: float
 
 
 class Friction(NamedTuple):
@@ -59,16 +68,22 @@ def over_step(piston: Piston, left: float, usual: float, fine: float, p: Any) ->
     stick and slip, and to which the accuracy belongs.
     """
     step = min(left, _following(piston, usual, fine, p))
+    allowed = CHANGE * fine
     while True:
         unhindered, mobility = piston.velocity + step * piston.acceleration, step * piston.mobility
         straight = unhindered - mobility * piston.friction
         change = mobility * abs(terms.dry_friction(straight, piston.load, p) - piston.friction)
         if change <= GENTLE * abs(straight - piston.velocity):
             return Friction(step, piston.friction, False)
-        after = at_end(unhindered, mobility, piston.load, p)
-        change = mobility * abs(after - piston.friction)
-        if change <= CHANGE * fine or step <= SHORTEST * fine:
-            return Friction(step, after, True)
+        if step <= SHORTEST * fine:
+            return Friction(step, at_end(unhindered, mobility, piston.load, p), True)
+        # a friction that changes by no more leads to a velocity between these two
+        low, high = straight - allowed, straight + allowed
+        at_low = _off(low, unhindered, mobility, piston.load, p)
+        at_high = _off(high, unhindered, mobility, piston.load, p)
+        if at_low <= 0.0 <= at_high:
+            ends = Ends(low, at_low, high, at_high)
+            return Friction(step, _between(ends, unhindered, mobility, piston.load, p), True)
         step *= 0.5
 
 
@@ -89,35 +104,42 @@ def at_end(unhindered: float, mobility: float, load: float, p: Any) -> float:
     """Return the dry friction, N, at the end of a step.
 
     unhindered: velocity at the end of the step without it, m/s. mobility: step over mass,
-    m/(s N). load: force of the oil on the piston, N. The velocity is looked for between 0 and
-    unhindered by the Illinois method, first where the friction of sliding unhindered leads.
+    m/(s N). load: force of the oil on the piston, N. The velocity lies between 0 and unhindered.
     """
-    low, at_low = 0.0, -unhindered
-    high, at_high = unhindered, mobility * terms.dry_friction(unhindered, load, p)
-    if at_high == 0.0:
-        return 0.0
-    velocity, side = unhindered - at_high, 0
-    if velocity * unhindered <= 0.0:
-        velocity = _between(low, at_low, high, at_high)
+    at_high = mobility * terms.dry_friction(unhindered, load, p)
+    ends = Ends(0.0, -unhindered, unhindered, at_high)
+    return _between(ends, unhindered, mobility, load, p)
+
+
+@compiled
+def _off(velocity: float, unhindered: float, mobility: float, load: float, p: Any) -> float:
+    """Return by how much, m/s, the velocity at a step's end is not what its friction makes it."""
+    return velocity + mobility * terms.dry_friction(velocity, load, p) - unhindered
+
+
+@compiled
+def _between(ends: Ends, unhindered: float, mobility: float, load: float, p: Any) -> float:
+    """Return the dry friction, N, at the end of a step; the velocity lies between two ends.
+
+    By the Illinois method.
+    """
+    low, at_low, high, at_high = ends
+    velocity, side = low, 0
     for _ in range(ITERATIONS):
-        missing = velocity + mobility * terms.dry_friction(velocity, load, p) - unhindered
-        if abs(missing) <= TOLERANCE:
+        if at_high == at_low:
             break
-        if missing * at_high > 0.0:
-            high, at_high = velocity, missing
+        velocity = (low * at_high - high * at_low) / (at_high - at_low)
+        off = _off(velocity, unhindered, mobility, load, p)
+        if abs(off) <= TOLERANCE:
+            break
+        if off * at_high > 0.0:
+            high, at_high = velocity, off
             if side == 1:
                 at_low *= 0.5
             side = 1
         else:
-            low, at_low = velocity, missing
+            low, at_low = velocity, off
             if side == -1:
                 at_high *= 0.5
             side = -1
-        velocity = _between(low, at_low, high, at_high)
     return (unhindered - velocity) / mobility
-
-
-@compiled
-def _between(low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return where the line through two points is zero."""
-    return (low * at_high - high * at_low) / (at_high - at_low)

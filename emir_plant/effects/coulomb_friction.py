@@ -1,11 +1,11 @@
 """Dry friction of the piston's seals, the same at every speed."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled
 
 
@@ -27,4 +27,4 @@ def friction(velocity: float, p: Any) -> float:
     """Return the friction force on the piston, N; it has the sign of the velocity, m/s."""
     if p.coulomb_friction_force == 0.0:
         return 0.0
-    return p.coulomb_friction_force * math.tanh(velocity / p.coulomb_friction_smoothing_speed)
+    return p.coulomb_friction_force * smooth_sign(velocity / p.coulomb_friction_smoothing_speed)

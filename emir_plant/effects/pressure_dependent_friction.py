@@ -1,11 +1,11 @@
 """Dry friction that grows with the load on the piston."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled
 
 
@@ -28,4 +28,4 @@ def friction(velocity: float, load: float, p: Any) -> float:
     if p.pressure_dependent_friction_coefficient == 0.0:
         return 0.0
     level = p.pressure_dependent_friction_coefficient * abs(load)
-    return level * math.tanh(velocity / p.pressure_dependent_friction_smoothing_speed)
+    return level * smooth_sign(velocity / p.pressure_dependent_friction_smoothing_speed)

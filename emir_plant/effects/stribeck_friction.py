@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled
 
 
@@ -31,4 +32,4 @@ def friction(velocity: float, p: Any) -> float:
         return 0.0
     hump = math.exp(-((velocity / p.stribeck_friction_stribeck_speed) ** 2))
     level = p.stribeck_friction_force * (1.0 + (p.stribeck_friction_breakaway - 1.0) * hump)
-    return level * math.tanh(velocity / p.stribeck_friction_smoothing_speed)
+    return level * smooth_sign(velocity / p.stribeck_friction_smoothing_speed)

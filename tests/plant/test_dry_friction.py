@@ -11,6 +11,7 @@ from emir_common.parameter_tree import with_values
 from emir_plant import core, dry_friction
 from emir_plant.core import Truth
 from emir_plant.effects import terms
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
@@ -111,6 +112,44 @@ def test_a_step_is_short_only_where_friction_turns_round() -> None:
     stuck = over_step(1e-4 * math.atanh(0.5), 1.0)  # creeping
     assert stuck == (longest, pytest.approx(1.0 / weight, rel=1e-3), True)  # it holds the load
     assert over_step(-1e-4, 5.0).step <= dry_friction.SHORTEST * longest
+
+
+def test_friction_changes_by_no_more_than_a_step_allows() -> None:
+    """Random pistons about a break-away, under accelerations that make it stick or let it go."""
+    values = {
+        "effects.stribeck_friction.force": 2.5e4,
+        "effects.stribeck_friction.breakaway": 1.7,
+        "effects.stribeck_friction.stribeck_speed": 6e-3,
+        "effects.stribeck_friction.smoothing_speed": 4e-4,
+    }
+    p, random = Plant(with_values(joint1(), values)).record[0], np.random.default_rng(0)
+    usual, fine, weight = 1e-3, 2.5e-4, 2e-4
+    shortest = dry_friction.SHORTEST * fine
+    held = {True: 0, False: 0}
+    for _ in range(2000):
+        velocity = random.normal(0.0, 1e-3)
+        nearly_held = weight * terms.dry_friction(velocity, 6e5, p)
+        acceleration = nearly_held + random.normal(0.0, 1.0)
+        piston = _piston(p, velocity, acceleration, weight)
+        step, force, whole = dry_friction.over_step(piston, usual, usual, fine, p)
+        if not whole:
+            continue
+        end = velocity + step * (acceleration - weight * force)
+        assert step * weight * abs(force - terms.dry_friction(end, 6e5, p)) <= 1e-9  # m/s
+        change = step * weight * abs(force - piston.friction)
+        held[step > shortest] += 1
+        assert step == shortest or change <= 1.001 * dry_friction.CHANGE * fine
+        if step < usual:  # and the step twice as long would have changed it by more
+            after = dry_friction.at_end(
+                velocity + 2.0 * step * acceleration, 2.0 * step * weight, 6e5, p
+            )
+            assert 2.0 * step * weight * abs(after - piston.friction) > dry_friction.CHANGE * fine
+    assert min(held.values()) > 100  # both were met
+
+
+@pytest.mark.parametrize("number", [-1e3, -20.0, -0.5, -1e-9, 0.0, 1e-3, 0.7, 3.0, 18.0, 800.0])
+def test_the_smooth_sign_is_the_hyperbolic_tangent(number: float) -> None:
+    assert abs(smooth_sign(number) - math.tanh(number)) <= 2.3e-16
 
 
 def test_a_swing_is_followed_finely_only_where_it_reaches_standstill() -> None:

@@ -19,7 +19,13 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.free_run import rms
-from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
+from emir_analysis.diagnosis.friction_laws import (
+    VISCOUS,
+    fullest,
+    nested,
+    sticks,
+    viscous_is_heard,
+)
 from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -231,14 +237,23 @@ class Search:
 
         A break-away may show in later sticks than those of the beginning.
         """
-        found = grown(law, self._evidence)
+        found = self._heard(grown(law, self._evidence))
         for more in fuller:
             if at_noise(found, self._evidence):
                 break
-            led = grown(more, self._evidence)
+            led = self._heard(grown(more, self._evidence))
             if at_noise(led, self._evidence):
                 found = led
         return found
+
+    def _heard(self, led: Trial) -> Trial:
+        """Return a trial without viscous friction that has become too small to be heard.
+
+        It may have led to where the machine sticks at the right instants, and is needed no more.
+        """
+        if VISCOUS not in led.effects or viscous_is_heard(led, self._evidence, self.floor):
+            return led
+        return refine_free_run(led.without(VISCOUS), self._evidence)
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.

@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.result import (
     ErrorTests,
     ParameterResult,
     SignalResult,
+    cautions,
 )
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
@@ -36,7 +37,7 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
     """Write the report as HTML. Raises InputError when the file cannot be written."""
     blocks: list[Block] = [
         Text(f"{VERDICTS[result.verdict]}: {result.statement}.", lead=True),
-        *[Text(line) for line in (result.tell_apart, *result.untold.values()) if line],
+        *[Text(line) for line in cautions(result)],
         *_effects(result.effects),
         *_free_runs(findings, result, judged),
         *_balances(findings, result),

@@ -122,7 +122,8 @@ class Diagnosis:
     what would do as well where ambiguous. tell_apart: a movement that would tell them apart.
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
-    stays unexplained. untold: what missing sensors leave open, by balance. control: a controller
+    stays unexplained. at_end: parameters that were led to the end of what data sheet and registry
+    allow. untold: what missing sensors leave open, by balance. control: a controller
     designed before and after, on the machine as found, where that was asked for.
     """
 
@@ -139,6 +140,7 @@ class Diagnosis:
     tests: dict[str, ErrorTests]
     parameters: dict[str, ParameterResult]
     shape: Shape | None
+    at_end: tuple[str, ...]
     untold: dict[str, str]
     control: dict[str, ControlResult]
     recording: str
@@ -167,6 +169,7 @@ def diagnosis(
         tests=_tests(judged, whole, period),
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
+        at_end=_at_end(findings),
         untold=untold(findings.evidence),
         control=control or {},
         recording=_names(findings.evidence),
@@ -192,9 +195,7 @@ def write_json(path: Path, result: "DataclassInstance") -> None:
 def summary(result: Diagnosis) -> str:
     """Return the result as lines for a terminal."""
     lines = [f"{result.verdict}: {result.statement}"]
-    if result.tell_apart:
-        lines.append(result.tell_apart)
-    lines += list(result.untold.values())
+    lines += cautions(result)
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in result.balances.items():
         figures = (b.noise, b.before, b.refitted, b.after)
@@ -210,6 +211,17 @@ def summary(result: Diagnosis) -> str:
     for name, c in result.control.items():
         lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
     return "\n".join(lines)
+
+
+def cautions(result: Diagnosis) -> list[str]:
+    """Return what a reader has to know beside the statement, a line for each."""
+    lines = [result.tell_apart] if result.tell_apart else []
+    if result.at_end:
+        lines.append(
+            f"at the end of what is allowed: {', '.join(result.at_end)}; where that cannot be,"
+            " something else is missing"
+        )
+    return lines + list(result.untold.values())
 
 
 def _ratios(s: SignalResult) -> str:
@@ -282,6 +294,15 @@ def _described(shape: Shape) -> str:
         return "no single signal predicts it"
     direction = " and the direction of motion" if shape.by_direction else ""
     return f"{shape.predictor}{direction} predicts {100 * shape.share:.0f} % of it"
+
+
+def _at_end(findings: Findings) -> tuple[str, ...]:
+    """Return the parameters of a model that explains, but may do so by the wrong means."""
+    if findings.verdict == "unexplained":
+        return ()
+    chosen = findings.chosen
+    together = zip(chosen.unknowns.members, chosen.x, strict=True)
+    return tuple(unknown.path for unknown, x in together if unknown.at_end(float(x)))
 
 
 def _tell_apart(findings: Findings) -> str | None:

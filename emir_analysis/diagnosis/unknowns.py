@@ -16,6 +16,7 @@ from emir_plant.parameters import Machine, groups
 from emir_plant.sheet import Sheet
 
 WIDE = 20.0  # an effect's parameter whose range spans more than this factor is fitted as its log
+END = 1e-3  # of its scale, within which a parameter stands at the end of what is allowed
 ROUNDING = 1e-9  # relative, by which x stays inside its bounds, so that its value does, too
 
 
@@ -52,6 +53,12 @@ class Unknown:
     def deviation(self, x: float, width: float) -> tuple[float, float]:
         """Return the values at x - width and x + width, inside the bounds."""
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
+
+    def at_end(self, x: float) -> bool:
+        """Tell whether x was led to the end of what is allowed, where that is not none at all."""
+        led = abs(x - self.start) > END
+        least = x - self.low < END and abs(self.value(self.low)) > ROUNDING * abs(self.scale)
+        return led and (least or self.high - x < END)
 
 
 @dataclass(frozen=True)

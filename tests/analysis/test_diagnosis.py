@@ -71,7 +71,30 @@ def test_a_healthy_machine_gets_its_parameters_and_no_effect(
         assert fitted.low < fitted.value < fitted.high
     for signal in result.signals.values():  # on a recording that the fit has not seen
         assert signal.refitted < 1.1 * signal.noise < signal.nominal
+    assert result.at_end == ()
     with_stroke_alone(folder, tmp_path)
+    with_a_tolerance_that_it_exceeds(tmp_path)
+
+
+def with_a_tolerance_that_it_exceeds(bags_: Path) -> None:
+    """Demand that a parameter at its end is told: 1 % off where the maker allows 0.99 %."""
+    narrow = recorded.DATA_SHEET.replace("{tol: 0.02}", "{tol: 0.0099}")
+    (bags_ / "narrow.yaml").write_text(narrow)
+    (bags_ / "signals.yaml").write_text(recorded.SIGNAL_MAP)
+    result = command(
+        bags_ / "a",
+        bags_ / "narrow.yaml",
+        bags_ / "signals.yaml",
+        bags_ / "b",
+        None,
+        bags_ / "narrow.html",
+        lambda _: None,
+    )
+    assert result.verdict == "nothing_missing", summary(result)
+    assert result.at_end == ("geometry.modal_frequency",)
+    told = "at the end of what is allowed: geometry.modal_frequency"
+    assert told in summary(result)
+    assert told in (bags_ / "narrow.html").read_text()
 
 
 def with_stroke_alone(folder: Path, bags_: Path) -> None:

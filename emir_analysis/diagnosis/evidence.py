@@ -41,6 +41,11 @@ class Evidence:
         return [Balances(experiment, self.stated) for experiment in self.experiments]
 
     @property
+    def name(self) -> str:
+        """The recordings' names."""
+        return ", ".join(experiment.name for experiment in self.experiments)
+
+    @property
     def windows_of_first(self) -> int:
         """Number of the balances' windows in the first recording."""
         return self._balances[0].time.size

@@ -14,15 +14,15 @@ from emir_analysis.diagnosis.pictures import (
     shape_picture,
 )
 from emir_analysis.diagnosis.result import (
-    TOLD,
     Diagnosis,
     EffectResult,
     ErrorTests,
     ParameterResult,
     SignalResult,
-    cautions,
 )
 from emir_analysis.diagnosis.select import quiet
+from emir_analysis.diagnosis.statement import TOLD
+from emir_analysis.diagnosis.summary import cautions
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
 VERDICTS = {

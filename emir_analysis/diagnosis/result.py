@@ -1,7 +1,6 @@
-"""The result of a diagnosis as values, as JSON and as lines of text."""
+"""The result of a diagnosis as values, and as JSON."""
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,20 +12,18 @@ from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
-from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.free_run import block_medians, rms
-from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
+from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
 from emir_analysis.diagnosis.statistics import (
     Interval,
     input_correlation,
     rms_intervals,
     whiteness,
 )
-from emir_analysis.diagnosis.telling import movement, untold
+from emir_analysis.diagnosis.telling import untold
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -34,7 +31,6 @@ from emir_plant.effects import REGISTRY
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of errors look back
@@ -156,11 +152,11 @@ def diagnosis(
     whole = {stage: np.concatenate(judged.errors(stage)) for stage in stages}
     fitted = _parameters(findings.chosen)
     return Diagnosis(
-        verdict=_verdict(findings, judged),
-        statement=_statement(findings) + _judgement(findings, judged),
+        verdict=verdict(findings, judged),
+        statement=statement(findings, judged),
         effects=_effects(findings, fitted),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
-        tell_apart=_tell_apart(findings),
+        tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
         balances=_balances(findings),
         signals=_signals(findings, {s: rms(error) for s, error in whole.items()}),
@@ -169,11 +165,11 @@ def diagnosis(
         tests=_tests(judged, whole, period),
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
-        at_end=_at_end(findings),
+        at_end=at_end(findings),
         untold=untold(findings.evidence),
         control=control or {},
-        recording=_names(findings.evidence),
-        judged_on=_names(judged.evidence),
+        recording=findings.evidence.name,
+        judged_on=judged.evidence.name,
     )
 
 
@@ -190,127 +186,6 @@ def write_json(path: Path, result: "DataclassInstance") -> None:
         path.write_text(json.dumps(_plain(asdict(result)), indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-
-
-def summary(result: Diagnosis) -> str:
-    """Return the result as lines for a terminal."""
-    lines = [f"{result.verdict}: {result.statement}"]
-    lines += cautions(result)
-    lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
-    for name, b in result.balances.items():
-        figures = (b.noise, b.before, b.refitted, b.after)
-        lines.append(f"{name:24}" + "".join(f"{f:11.3g}" for f in figures) + f"  {b.unit}")
-    lines += ["", f"free-run error on {result.judged_on}, times the sensor noise"]
-    heads = ("noise", "nominal", "refitted", "with effect", "black box")
-    lines.append(f"{'signal':24}" + "".join(f"{head:>12}" for head in heads))
-    for name, s in result.signals.items():
-        lines.append(f"{name:24}{s.noise:12.3g}" + _ratios(s) + f"  RMS, noise in {s.unit}")
-        lines.append(f"{'':36}" + _ratios(result.block_medians[name]) + "  median of 15 s blocks")
-    if result.control:
-        lines += ["", "predictive control of the machine as found, designed before and after"]
-    for name, c in result.control.items():
-        lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
-    return "\n".join(lines)
-
-
-def cautions(result: Diagnosis) -> list[str]:
-    """Return what a reader has to know beside the statement, a line for each."""
-    lines = [result.tell_apart] if result.tell_apart else []
-    if result.at_end:
-        lines.append(
-            f"at the end of what is allowed: {', '.join(result.at_end)}; where that cannot be,"
-            " something else is missing"
-        )
-    return lines + list(result.untold.values())
-
-
-def _ratios(s: SignalResult) -> str:
-    figures = (s.nominal, s.refitted, s.with_effect, s.black_box)
-    return "".join(f"{figure / s.noise:12.2f}" for figure in figures)
-
-
-def _statement(findings: Findings) -> str:
-    names = " and ".join(findings.chosen.effects)
-    speaking, shape = findings.speaking, findings.shape
-    if findings.verdict == "nothing_missing":
-        return "parameters inside the tolerances bring every balance and the free run to the noise"
-    remainder = ""
-    if speaking is not None and shape is not None:
-        column = list(BALANCES).index(speaking)
-        size = level(findings.residuals["after"])[column]
-        noise_share = size / findings.floor[column]
-        remainder = (
-            f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
-            f" ({noise_share:.1f} times its noise); {_described(shape)}"
-        )
-    if findings.verdict == "unexplained":
-        rejected = " and ".join(findings.rejected)
-        known = f"{rejected} comes closest but leaves too much; " if rejected else ""
-        return known + (remainder or "the balances are quiet, but the free run drifts away")
-    if findings.verdict == "ambiguous":
-        names += " or " + " or ".join(rival.name for rival in findings.rivals)
-        names += ", which this recording cannot tell apart"
-    return names + (f"; {remainder}" if remainder else "") + _unforeseeable(findings)
-
-
-def _unforeseeable(findings: Findings) -> str:
-    """Return that no model follows a machine to the end, where what no sensor tells decides."""
-    if not sticks(findings.chosen):
-        return ""
-    apart = math.sqrt(2.0 * parting(findings.chosen.machine, findings.evidence))
-    if apart <= 1.0:
-        return ""
-    return (
-        f"; it cannot be foreseen to the end: where it sticks, two of its runs that begin within a"
-        f" step of the resolver part by {apart:.1f} times the noise"
-    )
-
-
-def _surprised(findings: Findings, judged: Judged) -> bool:
-    """Tell whether the judge recordings show what the model does not explain."""
-    return not explained(findings.chosen, judged.evidence)
-
-
-def _verdict(findings: Findings, judged: Judged) -> str:
-    if findings.verdict == "nothing_missing" and _surprised(findings, judged):
-        return "unexplained"
-    return findings.verdict
-
-
-def _judgement(findings: Findings, judged: Judged) -> str:
-    if findings.verdict == "unexplained" or not _surprised(findings, judged):
-        return ""
-    off, judge = judged.off(STAGES[-1]), _names(judged.evidence)
-    by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
-    return f"; but {judge}, {by}, shows more: diagnose from that too"
-
-
-def _names(evidence: Evidence) -> str:
-    return ", ".join(experiment.name for experiment in evidence.experiments)
-
-
-def _described(shape: Shape) -> str:
-    if shape.share < TOLD:
-        return "no single signal predicts it"
-    direction = " and the direction of motion" if shape.by_direction else ""
-    return f"{shape.predictor}{direction} predicts {100 * shape.share:.0f} % of it"
-
-
-def _at_end(findings: Findings) -> tuple[str, ...]:
-    """Return the parameters of a model that explains, but may do so by the wrong means."""
-    if findings.verdict == "unexplained":
-        return ()
-    chosen = findings.chosen
-    together = zip(chosen.unknowns.members, chosen.x, strict=True)
-    return tuple(unknown.path for unknown, x in together if unknown.at_end(float(x)))
-
-
-def _tell_apart(findings: Findings) -> str | None:
-    if findings.verdict != "ambiguous":
-        return None
-    trials = [findings.chosen, *findings.rivals]
-    best, apart = movement(trials, findings.evidence)
-    return f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise"
 
 
 def _parameters(trial: Trial) -> dict[str, ParameterResult]:

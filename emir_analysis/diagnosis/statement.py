@@ -1,0 +1,100 @@
+"""What a diagnosis has found, in words."""
+
+import math
+
+from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.foresight import explained, parting
+from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.judged import STAGES, Judged
+from emir_analysis.diagnosis.shape import Shape
+from emir_analysis.diagnosis.telling import movement
+
+TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
+
+
+def verdict(findings: Findings, judged: Judged) -> str:
+    """Return the verdict: nothing is not missing where the judge recordings show something."""
+    if findings.verdict == "nothing_missing" and _surprised(findings, judged):
+        return "unexplained"
+    return findings.verdict
+
+
+def statement(findings: Findings, judged: Judged) -> str:
+    """Return the verdict in words, and what the judge recordings say of it."""
+    return _of_findings(findings) + _judgement(findings, judged)
+
+
+def _of_findings(findings: Findings) -> str:
+    names = " and ".join(findings.chosen.effects)
+    speaking, shape = findings.speaking, findings.shape
+    if findings.verdict == "nothing_missing":
+        return "parameters inside the tolerances bring every balance and the free run to the noise"
+    remainder = ""
+    if speaking is not None and shape is not None:
+        column = list(BALANCES).index(speaking)
+        size = level(findings.residuals["after"])[column]
+        noise_share = size / findings.floor[column]
+        remainder = (
+            f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
+            f" ({noise_share:.1f} times its noise); {_described(shape)}"
+        )
+    if findings.verdict == "unexplained":
+        rejected = " and ".join(findings.rejected)
+        known = f"{rejected} comes closest but leaves too much; " if rejected else ""
+        return known + (remainder or "the balances are quiet, but the free run drifts away")
+    if findings.verdict == "ambiguous":
+        names += " or " + " or ".join(rival.name for rival in findings.rivals)
+        names += ", which this recording cannot tell apart"
+    return names + (f"; {remainder}" if remainder else "") + _unforeseeable(findings)
+
+
+def _unforeseeable(findings: Findings) -> str:
+    """Return that no model follows a machine to the end, where what no sensor tells decides."""
+    if not sticks(findings.chosen):
+        return ""
+    apart = math.sqrt(2.0 * parting(findings.chosen.machine, findings.evidence))
+    if apart <= 1.0:
+        return ""
+    return (
+        f"; it cannot be foreseen to the end: where it sticks, two of its runs that begin within a"
+        f" step of the resolver part by {apart:.1f} times the noise"
+    )
+
+
+def _surprised(findings: Findings, judged: Judged) -> bool:
+    """Tell whether the judge recordings show what the model does not explain."""
+    return not explained(findings.chosen, judged.evidence)
+
+
+def _judgement(findings: Findings, judged: Judged) -> str:
+    if findings.verdict == "unexplained" or not _surprised(findings, judged):
+        return ""
+    off, judge = judged.off(STAGES[-1]), judged.evidence.name
+    by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
+    return f"; but {judge}, {by}, shows more: diagnose from that too"
+
+
+def _described(shape: Shape) -> str:
+    if shape.share < TOLD:
+        return "no single signal predicts it"
+    direction = " and the direction of motion" if shape.by_direction else ""
+    return f"{shape.predictor}{direction} predicts {100 * shape.share:.0f} % of it"
+
+
+def at_end(findings: Findings) -> tuple[str, ...]:
+    """Return the parameters of a model that explains, but may do so by the wrong means."""
+    if findings.verdict == "unexplained":
+        return ()
+    chosen = findings.chosen
+    together = zip(chosen.unknowns.members, chosen.x, strict=True)
+    return tuple(unknown.path for unknown, x in together if unknown.at_end(float(x)))
+
+
+def tell_apart(findings: Findings) -> str | None:
+    """Return which movement would tell rivals apart, where there are any."""
+    if findings.verdict != "ambiguous":
+        return None
+    trials = [findings.chosen, *findings.rivals]
+    best, apart = movement(trials, findings.evidence)
+    return f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise"

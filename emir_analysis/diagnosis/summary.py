@@ -1,0 +1,40 @@
+"""The result of a diagnosis as lines for a terminal."""
+
+from emir_analysis.diagnosis.result import Diagnosis, SignalResult
+
+
+def summary(result: Diagnosis) -> str:
+    """Return the result as lines for a terminal."""
+    lines = [f"{result.verdict}: {result.statement}"]
+    lines += cautions(result)
+    lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
+    for name, b in result.balances.items():
+        figures = (b.noise, b.before, b.refitted, b.after)
+        lines.append(f"{name:24}" + "".join(f"{f:11.3g}" for f in figures) + f"  {b.unit}")
+    lines += ["", f"free-run error on {result.judged_on}, times the sensor noise"]
+    heads = ("noise", "nominal", "refitted", "with effect", "black box")
+    lines.append(f"{'signal':24}" + "".join(f"{head:>12}" for head in heads))
+    for name, s in result.signals.items():
+        lines.append(f"{name:24}{s.noise:12.3g}" + _ratios(s) + f"  RMS, noise in {s.unit}")
+        lines.append(f"{'':36}" + _ratios(result.block_medians[name]) + "  median of 15 s blocks")
+    if result.control:
+        lines += ["", "predictive control of the machine as found, designed before and after"]
+    for name, c in result.control.items():
+        lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
+    return "\n".join(lines)
+
+
+def cautions(result: Diagnosis) -> list[str]:
+    """Return what a reader has to know beside the statement, a line for each."""
+    lines = [result.tell_apart] if result.tell_apart else []
+    if result.at_end:
+        lines.append(
+            f"at the end of what is allowed: {', '.join(result.at_end)}; where that cannot be,"
+            " something else is missing"
+        )
+    return lines + list(result.untold.values())
+
+
+def _ratios(s: SignalResult) -> str:
+    figures = (s.nominal, s.refitted, s.with_effect, s.black_box)
+    return "".join(f"{figure / s.noise:12.2f}" for figure in figures)

@@ -25,7 +25,7 @@ GENTLE = 0.5  # share of the change of velocity under the friction of the start,
 SWING = 2e-4  # m/s, amplitude of the piston in the fastest mode from which on steps are shorter:
 # the phase that is lost in it adds up over seconds and shifts the instants of sticking
 EVEN = 2.0  # fine steps where the friction stays the same all over that swing
-ITERATIONS = 60  # of the search; it takes about three
+ITERATIONS = 60  # of the search, far more than it takes
 TOLERANCE = 1e-9  # m/s
 
 

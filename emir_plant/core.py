@@ -59,6 +59,9 @@ class Truth(NamedTuple):
     tcp_deflection: float  # off the line of the first section, up positive, m
 
 
+COLUMNS = len(Truth._fields)
+
+
 class _Motion(NamedTuple):
     """The boom and the piston at an instant; SI units."""
 
@@ -369,15 +372,33 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
     commands: (k,), each held for dt, s; step: the longest integration step, s. Returns
     (1 + k // every, len(Truth)): the truth at the start and after every `every` commands.
     """
-    result = np.empty((1 + commands.size // every, len(truth(x, parameters))))
+    result = np.empty((1 + commands.size // every, COLUMNS))
     x, work = x.copy(), np.zeros((5, x.size))
+    _simulate(x, commands, dt, every, parameters, step, work, result)
+    return result
+
+
+@compiled_in_place
+def _simulate(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array,
+    commands: Array,
+    dt: float,
+    every: int,
+    parameters: NDArray[Any],
+    step: float,
+    work: Array,
+    result: Array,
+) -> None:
+    """Advance x in place over the whole sequence, and write the truths to result.
+
+    Written, not returned: assigning one array to part of another takes seconds to compile.
+    """
     for k in range(commands.size + 1):
         if k % every == 0:
             for i, value in enumerate(truth(x, parameters)):
                 result[k // every, i] = value
         if k < commands.size:
             _advance(x, commands[k], dt, step, parameters, work)
-    return result
 
 
 @compiled_parallel
@@ -395,8 +416,9 @@ def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
     (m, 1 + k // every, len(Truth)).
     """
     machines = parameters.size
-    columns = len(truth(starts[0], parameters[:1]))
-    result = np.empty((machines, 1 + commands.size // every, columns))
+    states, work = starts.copy(), np.zeros((machines, 5, starts.shape[1]))
+    result = np.empty((machines, 1 + commands.size // every, COLUMNS))
     for m in numba.prange(machines):
-        result[m] = simulate(starts[m], commands, dt, every, parameters[m : m + 1], step)
+        own = parameters[m : m + 1]
+        _simulate(states[m], commands, dt, every, own, step, work[m], result[m])
     return result

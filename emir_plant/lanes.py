@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant import core
-from emir_plant.core import DELAY_LINE, MODES, P_S, STEP, Array, Truth
+from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, STEP, Array
 from emir_plant.jit import compiled_in_place, compiled_parallel
 from emir_plant.lane import lane
 from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
 
 LANES = 8  # doubles in the widest registers there are
-COLUMNS = len(Truth._fields)
 STAGES = ("k1", "k2", "k3", "k4", "between")
 
 

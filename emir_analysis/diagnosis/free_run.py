@@ -35,9 +35,10 @@ def free_runs(
     if not able:
         return result
     stride = experiment.stride(SUBSTEP) if coarse else 1
+    commands = np.ascontiguousarray(experiment.commands[::stride])  # or more is compiled
     truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
-        experiment.commands[::stride],
+        commands,
         COMMAND_STEP * stride,
         experiment.every // stride,
         np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),

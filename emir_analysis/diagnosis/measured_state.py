@@ -90,17 +90,21 @@ def _mean_rate(work: Array, i: int) -> float:
 
 
 @compiled
-def _follow(
-    start: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
-) -> Array:
-    """Return (5, n), the columns of Modelled along measured (n, 5); steps of dt, s."""
+def _follow(  # noqa: PLR0913, PLR0917 (as _step)
+    start: Array,
+    commands: Array,
+    dt: float,
+    measured: Array,
+    parameters: NDArray[Any],
+    result: Array,
+) -> None:
+    """Write the columns of Modelled along measured, (n, 5), to result, (5, n); steps of dt, s."""
     p = parameters[0]
     samples, n = measured.shape[0], p.mode_joint.size
     every = commands.size // (samples - 1)
     arriving = command_delay.delayed(commands, dt, parameters)
     x, work = start.copy(), np.zeros((5, start.size))
     at = np.empty((3, measured.shape[1]))
-    result = np.zeros((5, samples))
     lifting, lowering, turning = 0.0, 0.0, 0.0
     for k in range(samples):
         result[0, k], result[1, k], result[2, k] = lifting, lowering, turning
@@ -124,7 +128,6 @@ def _follow(
             lifting += dt * _mean_rate(work, core.P_H)
             lowering += dt * _mean_rate(work, core.P_S)
             turning += dt * p.mode_joint[0] * _mean_rate(work, core.MODES + n)
-    return result
 
 
 @compiled_parallel
@@ -138,7 +141,7 @@ def follow(
     it was read, rad, as each machine's sensors mean them. parameters: (m,) records.
     """
     machines = parameters.size
-    result = np.empty((machines, 5, measured.shape[1]))
+    result = np.zeros((machines, 5, measured.shape[1]))
     for m in numba.prange(machines):
-        result[m] = _follow(starts[m], commands, dt, measured[m], parameters[m : m + 1])
+        _follow(starts[m], commands, dt, measured[m], parameters[m : m + 1], result[m])
     return result

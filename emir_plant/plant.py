@@ -36,6 +36,12 @@ class Plant:
         """The parameters as the compiled core reads them, shape (1,)."""
         return record(self.machine)
 
+    @property
+    def fastest(self) -> float:
+        """The highest natural frequency of boom and spool, rad/s."""
+        boom = math.sqrt(float(self.record["mode_stiffness"].max()))
+        return max(boom, self.machine.valve.natural_frequency)
+
     def initial(self, angle: float, pressure_lowering: float | None = None) -> Array:
         """Return the state at rest at t = 0, both chambers shut, at the boom angle, rad.
 

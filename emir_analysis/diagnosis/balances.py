@@ -6,7 +6,7 @@ rate (see `measured_state`), so that no noisy or quantised signal is differentia
 force            missing force on the piston, N, from the second integral of the boom's turning
 lifting_chamber  missing flow into the lifting chamber, m^3/s, from the integral of dp_H/dt
 lowering_chamber the same of the lowering chamber
-linkage          measured stroke minus the linkage's stroke at the measured angle, m
+linkage          measured stroke minus the piston's stroke at the measured angle, m
 bending          measured minus modelled tip deflection under the measured force, rad
 """
 
@@ -25,15 +25,16 @@ from emir_analysis.diagnosis.experiment import (
     COMMAND_STEP,
     OUTPUTS,
     STROKE,
-    SUBSTEP,
     Experiment,
 )
 from emir_analysis.diagnosis.free_run import ANGLE as ANGLE_COLUMN
-from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.free_run import STROKE as STROKE_COLUMN
+from emir_analysis.diagnosis.free_run import coarse_step, free_runs
 from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
+from emir_plant.effects import terms
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import resolver
@@ -88,9 +89,9 @@ class Balances:
         slopes = [_smoothed(column, LAG_SMOOTHING, period)[1] for column in shown.T]
         self._slopes = np.column_stack([self._rate, *slopes])
         p = Plant(geometry).record[0]
+        self._areas = p["area_lifting"], p["area_lowering"]
         arm = linkage.lever_arms(self._smooth_angle, p)
         stroke = linkage.strokes(experiment.angle, p)
-        self._off_linkage = experiment.outputs[:, 0] - stroke
         self._flow_per_rate = np.column_stack(
             [
                 (p["volume_lifting_0"] + p["area_lifting"] * stroke) / p["beta"],
@@ -137,7 +138,8 @@ class Balances:
         true = np.array([self._undistorted(plant.machine) for plant in plants])
         result = np.full((len(plants), self.time.size, len(BALANCES)), np.nan)
         for k, modelled in self._modelled(plants, true):
-            result[k] = self._missing(modelled, true[k])
+            stroke = self._stroke(plants[k], true[k])
+            result[k] = self._missing(modelled, true[k], stroke)
         return result
 
     def one_step(self, machine: Machine) -> Array:
@@ -194,7 +196,7 @@ class Balances:
         if not starts:
             return []
         able = list(starts)
-        stride = experiment.stride(SUBSTEP)
+        stride = experiment.stride(coarse_step(plants))
         followed = follow(
             np.array(list(starts.values())),
             experiment.commands[::stride],
@@ -204,7 +206,17 @@ class Balances:
         )
         return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
 
-    def _missing(self, modelled: Modelled, true: Array) -> Array:
+    def _stroke(self, plant: Plant, true: Array) -> Array:
+        """Return the stroke that the machine has at the angle, (n,) m, as it is shown."""
+        experiment = self._experiment
+        if not experiment.own_stroke:
+            return np.asarray(linkage.strokes(experiment.angle, plant.record[0]))
+        force = np.zeros(len(true))
+        if {H, S} <= experiment.measured:
+            force = true[:, 1] * self._areas[0] - true[:, 2] * self._areas[1]
+        return np.asarray(terms.strokes(np.ascontiguousarray(true[:, 0]), force, plant.record[0]))
+
+    def _missing(self, modelled: Modelled, true: Array, stroke: Array) -> Array:
         period = self._experiment.period
         angle, lifting, lowering, deflection = true[:, :4].T
         lifting = lifting - modelled.pressure_lifting
@@ -216,7 +228,7 @@ class Balances:
                 self._turn(turning) * self._mean(self._force_per_turning),
                 self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]) * self._filled[0],
                 self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]) * self._filled[1],
-                self._mean(self._off_linkage),
+                self._mean(self._experiment.outputs[:, 0] - stroke),
                 self._mean(deflection - modelled.deflection),
             ]
         )
@@ -272,8 +284,10 @@ def _integral(rate: Array, period: float) -> Array:
     return total
 
 
-def noise_floor(experiment: Experiment, machine: Machine) -> Array:
+def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> Array:
     """Return the residuals, (d, w, 5), that the sensors alone leave in each balance, in d draws.
+
+    geometry: as for `Balances`.
 
     Found by simulating the machine under the recorded command, reading it through the sensors'
     noise and quantisation, and computing its balances with its own parameters. Of a short
@@ -294,7 +308,7 @@ def noise_floor(experiment: Experiment, machine: Machine) -> Array:
             " check the data sheet"
         )
     seen = [sensed(experiment, machine, run, seed) for seed, run in enumerate(ideal)]
-    return np.array([Balances(each, machine).residuals([machine])[0] for each in seen])
+    return np.array([Balances(each, geometry).residuals([machine])[0] for each in seen])
 
 
 def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:
@@ -306,5 +320,6 @@ def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0
     )
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
-    shown = np.column_stack([linkage.strokes(angle, p), ideal[:, 2:] + noise * scale])
+    stroke = ideal[:, STROKE_COLUMN] if experiment.own_stroke else linkage.strokes(angle, p)
+    shown = np.column_stack([stroke, ideal[:, 2:] + noise * scale])
     return experiment.showing(angle, shown)

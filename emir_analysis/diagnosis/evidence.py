@@ -23,7 +23,8 @@ class Evidence:
 
     experiments: all with the same signals. sensors: (4,) the outputs' noise, NaN where an output
     is not known. told: (5,) which balances the signals allow; fitted: (5,) which of them hold
-    something that parameters could change.
+    something that parameters could change: the linkage's only where the stroke has a sensor of
+    its own. complete: all but the linkage's are told.
     """
 
     def __init__(self, experiments: Sequence[Experiment], stated: Machine) -> None:
@@ -34,7 +35,10 @@ class Evidence:
         self.sensors = np.where(shown, noise(stated), np.nan)
         self.shown = shown
         self.told = available(self.measured)
-        self.fitted = self.told & (np.arange(self.told.size) != LINKAGE)
+        parameters = np.arange(self.told.size) != LINKAGE
+        self.complete = bool(np.all(self.told[parameters]))
+        own_stroke = all(e.own_stroke for e in self.experiments)
+        self.fitted = self.told & (parameters | own_stroke)
 
     @cached_property
     def _balances(self) -> list[Balances]:
@@ -116,4 +120,4 @@ class Evidence:
 
 @lru_cache(maxsize=2)  # floor and drawn levels are asked for of one machine
 def _drawn(evidence: Evidence, machine: Machine) -> list[Array]:
-    return [noise_floor(e, machine) for e in evidence.experiments]
+    return [noise_floor(e, machine, evidence.stated) for e in evidence.experiments]

@@ -30,6 +30,7 @@ SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and le
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
 REST = 0.2  # s at the start from which the initial pressure is averaged
 SHORTEST_REST = 0.1  # s
+OWN_STROKE = 2.0  # times the resolver's error, by which a stroke that it does not show differs
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Experiment:
     period: s, between samples. commands: (k,) y2 every COMMAND_STEP. angle: (n,) rad.
     outputs: (n, 4) in the order of OUTPUTS, SI units, NaN where there is no sensor. rest: samples
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
-    the one that none shows is computed from the other.
+    the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
+    not what the stated linkage makes of the angle.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Experiment:
     outputs: Array
     rest: int
     measured: frozenset[str] = frozenset({ANGLE, *OUTPUTS})
+    own_stroke: bool = False
 
     @property
     def time(self) -> Array:
@@ -164,7 +167,9 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
-    return Experiment(name, period, commands, angle, outputs, rest, measured)
+    apart = float(np.sqrt(np.mean((shown[STROKE] - _strokes(angle, machine)) ** 2)))
+    own_stroke = {ANGLE, STROKE} <= measured and apart > OWN_STROKE * noise(machine)[0]
+    return Experiment(name, period, commands, angle, outputs, rest, measured, own_stroke)
 
 
 def _angles(stroke: Array, machine: Machine) -> Array:

@@ -7,12 +7,15 @@ import numpy as np
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, SUBSTEP, Experiment
 from emir_analysis.signals import Array
 from emir_plant import lanes
+from emir_plant.core import Truth
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import readings, undistorted
 
 SHOWN = ("angle", "stroke", "pressure_lifting", "pressure_lowering", "deflection")
-ANGLE = 0  # the resolver's; the others are the compared outputs, in the order of OUTPUTS
+ANGLE, STROKE = 0, 1  # the resolver's; the others are the compared outputs, in the order of OUTPUTS
+
+STABLE = 2.0  # rad, of the fastest oscillation in a step; Runge-Kutta 4 is unstable above 2.8
 
 
 def free_runs(
@@ -34,7 +37,7 @@ def free_runs(
     result = np.full((len(plants), experiment.angle.size, len(SHOWN)), np.nan)
     if not able:
         return result
-    stride = experiment.stride(SUBSTEP) if coarse else 1
+    stride = experiment.stride(coarse_step(plants)) if coarse else 1
     commands = np.ascontiguousarray(experiment.commands[::stride])  # or more is compiled
     truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
@@ -42,12 +45,24 @@ def free_runs(
         COMMAND_STEP * stride,
         experiment.every // stride,
         np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
-        COMMAND_STEP * stride,
+        min(COMMAND_STEP * stride, stable_step(plants)),
     )
     for k, truth in zip(able, truths, strict=True):
         shown = readings(plants[k], truth, experiment.period)
         result[k] = np.column_stack([getattr(shown, name) for name in SHOWN])
+        if experiment.own_stroke:
+            result[k][:, STROKE] = truth[:, Truth._fields.index("stroke")]
     return result
+
+
+def coarse_step(plants: Sequence[Plant]) -> float:
+    """Return the step, s, of coarse integration that all machines allow."""
+    return min(SUBSTEP, stable_step(plants))
+
+
+def stable_step(plants: Sequence[Plant]) -> float:
+    """Return the longest step, s, of Runge-Kutta 4 that is stable for all machines."""
+    return STABLE / max(plant.fastest for plant in plants)
 
 
 def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | None:

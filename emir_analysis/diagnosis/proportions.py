@@ -27,6 +27,7 @@ SCALES: dict[str, Callable[[Machine], float]] = {  # by a size's unit; others st
     "m^3/Pa": lambda m: m.cylinder.area_lifting * m.geometry.triangle_b / m.cylinder.beta,
     "Pa s/m^3": lambda m: m.supply.p0 / m.valve.flow_nominal,
     "1/m": lambda m: 1.0 / m.geometry.triangle_b,
+    "1/m^2": lambda m: 1.0 / m.geometry.triangle_b**2,
 }
 
 

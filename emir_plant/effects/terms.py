@@ -2,12 +2,17 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from emir_plant.effects import (
+    backlash,
     coulomb_friction,
     entrained_air,
     external_leakage,
     flow_gain_drift,
     internal_leakage,
+    linkage_error,
     pressure_dependent_friction,
     stribeck_friction,
     valve_gain_asymmetry,
@@ -15,6 +20,20 @@ from emir_plant.effects import (
     viscous_friction,
 )
 from emir_plant.jit import compiled
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def strokes(angles: Array, forces: Array, p: Any) -> Array:
+    """Return the piston's strokes, (n,) m, at boom angles, (n,) rad.
+
+    forces: (n,) N, of the oil, slow enough for the piston to rest on a flank of its play.
+    """
+    found = np.empty(angles.size)
+    for k in range(angles.size):
+        found[k] = linkage_error.stroke(angles[k], p) + backlash.flank(forces[k], p)
+    return found
 
 
 @compiled

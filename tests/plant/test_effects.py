@@ -300,11 +300,12 @@ def test_a_load_acts_from_its_start_for_its_duration() -> None:
 
 
 def test_linkage_error_is_the_stated_one_and_keeps_the_power() -> None:
-    p = _with(linkage_error={"scale": 0.01, "slope": 0.05}).record[0]
+    error = {"scale": 0.01, "slope": 0.05, "curvature": -0.04}
+    p = _with(linkage_error=error).record[0]
     for angle in np.radians(np.linspace(-10, 90, 21)):
         stated, h = linkage.lever_arm(angle, p), linkage.stroke(angle, p)
         arm = linkage_error.lever_arm(angle, p)
-        assert arm == pytest.approx(stated * (1.01 + 0.05 * h), rel=1e-12)
+        assert arm == pytest.approx(stated * (1.01 + 0.05 * h - 0.04 * h**2), rel=1e-12)
         step = 1e-5
         slope = linkage_error.stroke(angle + step, p) - linkage_error.stroke(angle - step, p)
         assert arm == pytest.approx(slope / (2 * step), rel=1e-8)

@@ -81,7 +81,9 @@ def _fitted(
     experiments: Sequence[Experiment], evidence: Evidence, order: int, period: float
 ) -> BlackBox:
     all_outputs = np.concatenate([_shown(e, evidence) for e in experiments])
-    mean, spread = all_outputs.mean(axis=0), all_outputs.std(axis=0)
+    mean = all_outputs.mean(axis=0)
+    # a signal that stays where it is has no spread of its own
+    spread = np.maximum(all_outputs.std(axis=0), evidence.sensors[evidence.shown])
     dead_zone = evidence.stated.valve.dead_zone
     empty = BlackBox(order, period, np.zeros((0, 0)), mean, spread, dead_zone)
     rows, targets = [], []

@@ -48,10 +48,13 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
 def viscous_is_heard(known: Trial, evidence: Evidence, floor: Array) -> bool:
     """Tell whether a trial's viscous friction at the fastest is above the force balance's noise.
 
-    floor: (5,) what the sensors leave in each balance.
+    Where sensors are missing for that balance, any may be. floor: (5,) what the sensors leave in
+    each balance, NaN where it is not told.
     """
     if VISCOUS not in known.effects:
         return False
+    if not evidence.told[FORCE]:
+        return True
     _, velocity = evidence.signals()["piston_velocity"]
     fastest = float(np.max(np.abs(velocity)))
     return known.machine.effects.viscous_friction.coefficient * fastest >= float(floor[FORCE])

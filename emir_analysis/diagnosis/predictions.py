@@ -28,10 +28,12 @@ def write_predictions(folder: Path, judged: Judged) -> None:
     In each, the topics /STAGE/SIGNAL and /measured/SIGNAL, stamped by the log time from 0, in SI
     units. Raises InputError for what cannot be written.
     """
+    stems = [Path(experiment.name).stem for experiment in judged.evidence.experiments]
     for k, experiment in enumerate(judged.evidence.experiments):
+        begin = stems[k] if stems.count(stems[k]) == 1 else f"{stems[k]}_{k + 1}"
         for stage in STAGES:
             signals = {"measured": experiment.outputs, stage: judged.runs[stage][k]}
-            name = f"{Path(experiment.name).stem}_{stage}"
+            name = f"{begin}_{stage}"
             try:
                 _write(folder / f"{name}.mcap", signals, experiment)
             except (OSError, ParameterError) as error:

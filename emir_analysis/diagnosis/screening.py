@@ -151,7 +151,7 @@ class _Candidate:
 def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
     """Return the known trial with each further effect of the registry, the best first.
 
-    An effect that cannot be simulated, or that does not stay on, is not in the list.
+    An effect that does not stay on is not in the list.
     """
     left = _Left(known, _in_balances(evidence, floor), STEP)
     return _fitted(_begun(known, sheet, _by_balance(known, evidence), left))
@@ -275,7 +275,8 @@ def _starts(
     if effect == LOAD:
         return [x, *(_fields(members, load) for load in loads)]
     sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
-    allowed = [s for s in STARTS if s > 0.0 or any(u.low < 0.0 for u in members)]
+    negative = any(u.low < 0.0 for u, size in zip(members, sizes, strict=True) if size)
+    allowed = [s for s in STARTS if s > 0.0 or negative]
     switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
     starts = [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
     for stepwise in REGISTRY[effect].stepwise:

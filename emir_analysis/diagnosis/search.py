@@ -281,7 +281,7 @@ class Search:
             found = screen(best.trial, self._sheet, self._head, self.floor)
             better = self._by_balances(found, best)
             near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
-            told = near or np.all(self._evidence.told)
+            told = near or self._evidence.complete
             if told and not self._quiet(best.trial):
                 return better
         known = [t.trial.effects for t in better]
@@ -371,7 +371,7 @@ class Search:
         parameters with it: they stay as the balances say, if those are all told.
         """
         full = fit_free_run(tried.trial, self._head)
-        if np.all(self._evidence.told) and excess(full, self._head) > HOPELESS**2 - 1.0:
+        if self._evidence.complete and excess(full, self._head) > HOPELESS**2 - 1.0:
             return replace(tried, free_run=free_run_score(full, self._evidence))
         ways = [full]
         for effect in full.effects:

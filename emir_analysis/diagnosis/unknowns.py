@@ -110,8 +110,13 @@ def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
 def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Unknown:
     group, name = path.rsplit(".", 1)
     value = float(getattr(stated[group], name))
-    unit = quantities(stated[group])[name].unit
-    return Unknown(path, unit, value, abs(value) * tolerance, -1.0, 1.0, 0.0, toleranced=True)
+    about = quantities(stated[group])[name]
+    spread = abs(value) * tolerance
+    low, high = -1.0, 1.0
+    if spread > 0.0:  # a tolerance may lead beyond what a machine can be built with
+        low = max(low, (about.low - value) / spread + ROUNDING)
+        high = min(high, (about.high - value) / spread - ROUNDING)
+    return Unknown(path, about.unit, value, spread, low, high, 0.0, toleranced=True)
 
 
 def _of_effect(effect: str, machine: Machine) -> list[Unknown]:

@@ -14,7 +14,7 @@ from scipy.stats import norm
 from emir_analysis.cli import main
 from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
 from emir_analysis.diagnosis.actuator.fitting import fit
-from emir_analysis.diagnosis.actuator.record import ActuatorRecord, open_record
+from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
 from emir_common.parameter_tree import with_values
@@ -52,6 +52,14 @@ def _proportional(spool: float, _: float) -> float:
 
 def _limited(spool: float, _: float) -> float:
     return float(np.clip(recorded.GAIN * spool, -0.8, 0.5))
+
+
+def test_the_noise_of_a_pressure_is_at_least_that_of_its_steps() -> None:
+    """Third differences of a slow signal in coarse steps are mostly 0."""
+    slow = np.round(20.0 * np.sin(np.arange(500) / 60.0))
+    assert noise_of(slow) == pytest.approx(1.0 / np.sqrt(12.0))
+    fine = np.random.default_rng(1).standard_normal(5000)
+    assert noise_of(fine) == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_machine_as_its_sheet_says_lacks_nothing(folder: Path) -> None:

@@ -9,7 +9,8 @@ import pytest
 import recorded
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.diagnosis.balances import BALANCES, level, sensed
+from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
+from emir_analysis.diagnosis.black_box import train
 from emir_analysis.diagnosis.candidates import (
     Trial,
     at_rest,
@@ -21,8 +22,18 @@ from emir_analysis.diagnosis.diagnose import loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.search import Search, Tried
-from emir_analysis.diagnosis.select import SEEN, STRONG, balance_score, limits, quiet, speaks
+from emir_analysis.diagnosis.select import (
+    SEEN,
+    STRONG,
+    balance_score,
+    free_run_score,
+    limits,
+    quiet,
+    speaks,
+)
+from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -130,6 +141,63 @@ def test_a_balance_without_its_sensor_says_nothing() -> None:
     assert np.all(np.isfinite(left[:, np.invert(silent)]))
     assert np.array_equal(np.isnan(floor), silent)
     assert loudest(1e6 * left, floor, limits(stated, evidence)) == "lifting_chamber"
+
+
+def test_the_noise_of_a_balance_is_that_of_a_machine_with_another_boom() -> None:
+    """A payload: what is missing counts in the stated machine's units, so does its noise."""
+    stated = joint1()
+    machine = with_values(stated, {"effects.payload.mass": 900.0})
+    evidence = Evidence([run(machine, 60.0)], stated)
+    left, floor = level(evidence.residuals([machine])[0]), evidence.floor(machine)
+    assert left[:3] == pytest.approx(floor[:3], rel=0.15)
+
+
+def test_viscous_friction_is_kept_where_no_force_balance_tells_how_much_is_heard() -> None:
+    stated = joint1()
+    evidence = Evidence([without_p_s(run(with_values(stated, FRICTION)))], stated)
+    found = trial(Sheet(stated, TOLERANCES, {}, ()), ("viscous_friction",))
+    assert viscous_is_heard(found, evidence, evidence.floor(stated))
+
+
+def test_a_stiff_boom_is_simulated_in_steps_that_stay_stable() -> None:
+    """Its fastest mode, 250 Hz, is beyond what steps of 2 ms can follow."""
+    stiff = with_values(joint1(), {"geometry.section_spring": 16.0 * 1.839e8})
+    assert Plant(stiff).fastest > 2.8 / 2e-3
+    experiment = run(stiff, 6.0)
+    fine, coarse = (
+        free_runs([stiff], experiment, [(0.8, 20e5)], coarse=each)[0] for each in (False, True)
+    )
+    assert np.all(np.isfinite(coarse))
+    assert np.sqrt(np.mean((coarse - fine)[:, 2] ** 2)) < 0.1 * stiff.sensors.pressure_noise
+    assert np.all(np.isfinite(Balances(experiment, stiff).residuals([stiff])))
+
+
+def test_a_tolerance_leads_no_further_than_a_machine_can_be_built() -> None:
+    stated = with_values(joint1(), {"cylinder.beta": 2.9e9})
+    found = unknowns(Sheet(stated, {"cylinder.beta": 0.1}, {}, ()))
+    for x in found.bounds:
+        assert 0.89 * 2.9e9 < found.at(x).cylinder.beta < 1.04 * 2.9e9
+
+
+def test_less_error_than_the_noise_is_no_merit() -> None:
+    """At rest the free run may stand anywhere in the resolver's step."""
+    stated = joint1()
+    still = run(stated, 30.0).until(0.9)  # before the first move
+    scores = []
+    for part in (-0.45, 0.0, 0.45):
+        shown = replace(still, angle=still.angle + part * stated.sensors.resolver_step)
+        evidence = Evidence([shown], stated)
+        scores.append(free_run_score(trial(Sheet(stated, {}, {}, ()), ()), evidence, seen=0.0))
+    assert max(scores) - min(scores) < 2.0
+
+
+@pytest.mark.parametrize("angle", [0.75, 0.78, 0.8, 0.83, 0.86, 0.9, 0.95, 1.0])
+def test_a_black_box_may_be_trained_where_a_signal_stays_as_it_is(angle: float) -> None:
+    """At rest but for the last third: the stroke has no spread before."""
+    commands = np.append(np.zeros(500), recorded.moves(8.0, seed=5))
+    experiment = operated(joint1(), commands, angle=angle)
+    model = train(Evidence([experiment], joint1()))
+    assert np.all(np.isfinite(model.free_run(experiment)))
 
 
 def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:

@@ -82,9 +82,13 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
 
 
 def noise_of(pressure: Array) -> float:
-    """Return the white noise in a smooth signal, from the median of its third differences."""
+    """Return the white noise in a smooth signal, from the median of its third differences.
+
+    At least the error of the steps in which it is recorded.
+    """
     third = np.diff(pressure, 3)
-    return float(np.median(np.abs(third)) / (0.6745 * np.sqrt(20.0)))
+    step = np.min(np.diff(np.unique(pressure)))
+    return float(max(np.median(np.abs(third)) / (0.6745 * np.sqrt(20.0)), step / np.sqrt(12.0)))
 
 
 def _check(path: Path, signal: Signal, period: float) -> None:

@@ -6,7 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from emir_analysis.diagnosis.recording_checks import check_motion, check_sampling, check_values
+from emir_analysis.diagnosis.recording_checks import (
+    check_before_command,
+    check_motion,
+    check_sampling,
+    check_values,
+)
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Recording, Signal, SignalMap, load
 from emir_plant import linkage
@@ -164,6 +169,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     if STROKE not in shown:
         shown[STROKE] = _strokes(angle, machine)
     check_motion(name, angle, machine)
+    check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
@@ -204,10 +210,11 @@ def noise(machine: Machine) -> Array:
 
 
 def _held(command: Signal, begin: float, count: int) -> Array:
-    """Return the command on its grid, each message held until the next."""
+    """Return the command on its grid, each message held until the next; 0 before the first."""
     time = begin + np.arange(count) * COMMAND_STEP
     latest = np.searchsorted(command.time, time + 1e-6, side="right") - 1
-    return np.clip(command.value[np.maximum(latest, 0)], -1.0, 1.0)
+    held = np.where(latest < 0, 0.0, command.value[np.maximum(latest, 0)])
+    return np.asarray(np.clip(held, -1.0, 1.0))
 
 
 def _rest(name: str, commands: Array, period: float, machine: Machine) -> int:

@@ -10,6 +10,7 @@ from emir_plant.parameters import Machine
 
 LARGEST_GAP = 0.2  # s without a sample: the slow mode is still followed by interpolation
 LEAST_MOTION = 20  # resolver steps of travel below which nothing can be told from a recording
+AT_REST = 0.05  # of the whole travel: a boom that sinks through a leak before its first move
 LEAST_PRESSURE = 1e-3  # of the pump's pressure; a chamber that stays below is not in Pa
 LARGEST = {  # beyond which a signal is not in its unit, and the unit that it is likely in
     "valve_command": (2.0, "per cent"),
@@ -37,6 +38,19 @@ def check_motion(name: str, angle: Array, machine: Machine) -> None:
         raise InputError(
             f"{name}: never moves (the angle stays within {np.ptp(angle):.2g} rad);"
             " record moves up and down over some degrees"
+        )
+
+
+def check_before_command(name: str, time: Array, angle: Array, first: float) -> None:
+    """Raise InputError where the boom moves before the first command, at a time, s.
+
+    A valve whose command is published when it changes has none before the first move.
+    """
+    before = angle[time < first]
+    if before.size and np.ptp(before) > AT_REST * np.ptp(angle):
+        raise InputError(
+            f"{name}: moves before the first valve_command at {first:.2f} s; record the command"
+            " from the start"
         )
 
 

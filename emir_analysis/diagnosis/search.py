@@ -180,6 +180,7 @@ class Search:
         if not chosen.effects or not self._enough(self.whole(chosen)):
             return chosen
         least = self._on_whole(self.whole(chosen)) + STRONG
+        enough = []
         for effect in chosen.effects:
             if effect in self._settled:
                 continue
@@ -191,9 +192,12 @@ class Search:
             known = self._whole.get(fewer.effects, fitted)
             fitted = min(fitted, known, key=self._on_whole)
             if self._on_whole(fitted) < least and self._enough(fitted):
-                self._whole[fewer.effects] = fitted
-                return self.needed(fitted)
-        return chosen
+                enough.append(fitted)
+        if not enough:
+            return chosen
+        best = min(enough, key=self._on_whole)
+        self._whole[best.effects] = best
+        return self.needed(best)
 
     def _on_whole(self, fitted: Trial) -> float:
         return free_run_score(fitted, self._evidence, seen=0.0)

@@ -75,6 +75,18 @@ def test_a_stroke_that_no_sensor_shows_is_the_angles(machine: Machine) -> None:
     assert "piston_stroke" not in run.measured
 
 
+def test_a_command_that_is_published_when_it_changes_is_0_before_the_first_move(
+    machine: Machine,
+) -> None:
+    truth = recorded.simulate(machine, recorded.moves(12.0, seed=5))
+    angle = Signal("joint_angle", *recorded.measured(machine, truth, seed=5)["joint_states"], "rad")
+    command = Signal("valve_command", np.array([1.0, 3.0]), np.array([0.4, 0.0]), "1")
+    run = experiment("run", Recording({"valve_command": command, "joint_angle": angle}, 0), machine)
+    assert np.all(run.commands[:1000] == 0.0)
+    assert np.all(run.commands[1000:3000] == 0.4)
+    assert np.all(run.commands[3000:] == 0.0)
+
+
 def rms(missing: recorded.Array) -> dict[str, float]:
     return dict(zip(BALANCES, np.sqrt(np.mean(missing**2, axis=0)), strict=True))
 

@@ -214,6 +214,11 @@ def _moving(topics: Topics) -> None:
     topics["valve_command"] = (time, np.full_like(value, 0.4))
 
 
+def _late_command(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    topics["valve_command"] = (time[300:], value[300:])
+
+
 def _gap(topics: Topics) -> None:
     time, value = topics["pressure_lifting"]
     kept = (time < 5.0) | (time > 6.0)
@@ -257,6 +262,7 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_still, "never moves"),
         (_closed, "never leaves the dead zone"),
         (_moving, "a second at rest"),
+        (_late_command, "moves before the first valve_command at 3.00 s"),
         (_gap, "gap of 1.0"),
         (_short, "record at least 10 s"),
         (_in_bar, "is it in bar"),

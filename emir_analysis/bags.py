@@ -71,7 +71,7 @@ def read(path: Path, topics: Collection[str] | None = None) -> dict[str, list[Me
         raise InputError(f"{path}: no message in it")
     for topic in topics or ():
         if topic not in found:
-            there = ", ".join(sorted(recorded_topics(path))) or "none"
+            there = ", ".join(sorted(recorded_topics(path))) or "none (cut off before the first?)"
             raise InputError(f"{path}: topic {topic} is not recorded; there are: {there}")
     for messages in found.values():
         messages.sort(key=lambda message: message.log_time)
@@ -121,6 +121,9 @@ def records(file: Path) -> Iterator[McapRecord | Raw]:
     InputError where the file is damaged.
     """
     with _told(file), file.open("rb") as stream:
+        if stream.read(len(MAGIC)) != MAGIC:
+            raise McapError("not an MCAP file, or an empty one")
+        stream.seek(0)
         for record in _sequence(stream):
             if isinstance(record, Chunk):
                 yield from _in_chunk(record)

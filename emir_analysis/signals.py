@@ -81,9 +81,17 @@ def read_signal_map(file: Path) -> dict[str, Source]:
         content = read_map(file, what="signals")
     except ParameterError as error:
         raise InputError(str(error)) from None
-    return {
+    found = {
         str(name): _source(file, name, entry) for name, entry in content.items() if name != TIME
     }
+    shown: dict[tuple[str, str], str] = {}
+    for name, source in found.items():
+        other = shown.setdefault(source[:2], name)
+        if other != name:
+            raise InputError(
+                f"{file}: {other} and {name} stand in one field, {source.field} of {source.topic}"
+            )
+    return found
 
 
 def _source(file: Path, name: str, entry: Any) -> Source:

@@ -8,14 +8,30 @@ import yaml
 from emir_common.quantity import ParameterError
 
 
+class _Loader(yaml.SafeLoader):
+    """YAML in which no key of a map stands twice: the first would be lost without a word."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 (as in the library)
+        """Return the map. Raises ConstructorError for a key that stands twice."""
+        names: set[str] = set()
+        for key, _ in node.value:
+            if key.value in names:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"{key.value} stands twice", key.start_mark
+                )
+            if isinstance(key, yaml.ScalarNode):
+                names.add(key.value)
+        return super().construct_mapping(node, deep=deep)
+
+
 def read_map(file: Path, *, what: str) -> dict[Any, Any]:
     """Return the map that a YAML file holds.
 
     what: the name of its entries, for the message when there are none. Raises ParameterError,
-    naming the file, for one that cannot be read, is not YAML or holds no map.
+    naming the file, for one that cannot be read, is not YAML, holds no map or a key twice.
     """
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+        content = yaml.load(file.read_text(encoding="utf-8"), _Loader)  # noqa: S506 (a SafeLoader)
     except OSError as error:
         raise ParameterError(f"{file}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:

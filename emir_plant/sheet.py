@@ -114,13 +114,16 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
             continue
         if entry.get("unit", about.unit) != about.unit:
             raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
+        misspelt = [key for key in entry if str(key).startswith("tol") and key != "tol"]
+        if misspelt:
+            raise ParameterError(f"{path}: {misspelt[0]}: a tolerance is given as tol")
         values[path] = _number(entry.get("value", 1.0), path)
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
     effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
     stated = {path: entries[path] for path in values}
     return Sheet(
         machine=Machine(**groups, effects=effects),
-        tolerances={path: float(e["tol"]) for path, e in stated.items() if "tol" in e},
+        tolerances={path: _tolerance(e, path) for path, e in stated.items() if "tol" in e},
         sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
         ignored=unknown,
     )
@@ -172,6 +175,13 @@ def _number(value: Any, path: str) -> float:
     return int(number) if isinstance(value, int) else number
 
 
+def _tolerance(entry: dict[str, Any], path: str) -> float:
+    tolerance = _number(entry["tol"], f"{path}: tol")
+    if not 0.0 <= tolerance < 1.0:
+        raise ParameterError(f"{path}: tol = {tolerance}: a relative one, 0 ... 1, is expected")
+    return float(tolerance)
+
+
 def _entries(members: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the entries of a group, maps of plain numbers spread out."""
     found: dict[str, dict[str, Any]] = {}
@@ -194,4 +204,6 @@ def _group(kind: type[Any], name: str, values: dict[str, float]) -> Any:
             raise ParameterError(
                 f"{name}.{f.name}: missing; allowed is {f.metadata['quantity'].allowed}"
             )
+        if f.type in {int, "int"} and given.get(f.name, 0) % 1 != 0:
+            raise ParameterError(f"{name}.{f.name} = {given[f.name]}: not a whole number")
     return kind(**given)

@@ -305,7 +305,7 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
         raise InputError(
             f"{experiment.name}: the data sheet's machine cannot rest at"
             f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound;"
-            " check the data sheet"
+            " check the data sheet, and sign and zero of joint_angle"
         )
     seen = [sensed(experiment, machine, run, seed) for seed, run in enumerate(ideal)]
     return np.array([Balances(each, geometry).residuals([machine])[0] for each in seen])

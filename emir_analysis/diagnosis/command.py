@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from emir_analysis.bags import files, is_finished
 from emir_analysis.diagnosis.control import before_and_after
 from emir_analysis.diagnosis.diagnose import diagnose
 from emir_analysis.diagnosis.experiment import Experiment, open_experiment
@@ -10,10 +11,12 @@ from emir_analysis.diagnosis.graph_signals import graph_signals
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.model_file import write_model
 from emir_analysis.diagnosis.page import write_page
-from emir_analysis.diagnosis.predictions import check_folder, write_predictions
+from emir_analysis.diagnosis.predictions import write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
 from emir_analysis.diagnosis.search import Progress
+from emir_analysis.diagnosis.summary import summary
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs
 from emir_analysis.signals import SignalMap, read_signal_map
 from emir_plant.parameters import Machine
 from emir_plant.sheet import data, load_sheet
@@ -42,20 +45,21 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     compared on it. predictions: folder for the simulated runs. Raises InputError or
     ParameterError, one line each, for anything that cannot be used.
     """
-    _check_outputs([json, html, model_out], predictions)
+    check_outputs([json, model_out, html], predictions, [datasheet, signals])
     sheet = load_sheet(datasheet or data("joint1.yaml"))
     judges = _several(judge)
     missing = [path for path in judges if not path.exists()]
     if missing:
         raise InputError(f"{missing[0]}: no such recording")
     signal_map = None if signals is None else read_signal_map(signals)
-    experiments = []
-    for path in _several(bag):
-        progress(f"reading {path}")
-        experiments.append(_opened(path, signal_map, sheet.machine))
+    experiments = [_opened(each, signal_map, sheet.machine, progress) for each in _several(bag)]
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
-    opened = [_opened(path, signal_map, sheet.machine) for path in judges]
+    try:
+        opened = [_opened(path, signal_map, sheet.machine, progress) for path in judges]
+        useless = None
+    except InputError as error:  # what was found is written all the same
+        opened, useless = [], error
     judgement = judged(findings, opened or experiments)
     control = None
     if model_out is not None:
@@ -70,20 +74,23 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
         write_predictions(predictions, judgement)
     if html is not None:
         write_page(html, findings, result, judgement)
+    if useless is not None:
+        progress(summary(result))
+        raise InputError(f"{useless}; what was found is judged on the same recordings")
     return result
 
 
-def _opened(path: Path, signal_map: SignalMap | None, machine: Machine) -> Experiment:
+def _opened(
+    path: Path, signal_map: SignalMap | None, machine: Machine, progress: Progress
+) -> Experiment:
+    progress(f"reading {path}")
     known = graph_signals(path) if signal_map is None else signal_map
-    return open_experiment(path, known, machine)
-
-
-def _check_outputs(files: Sequence[Path | None], folder: Path | None) -> None:
-    for file in files:
-        if file is not None and not file.parent.is_dir():
-            raise InputError(f"{file}: no such folder {file.parent}")
-    if folder is not None:
-        check_folder(folder)
+    opened = open_experiment(path, known, machine)
+    for file in files(path):
+        if not is_finished(file):
+            end = float(opened.time[-1])
+            progress(f"{file}: was cut off; read as far as it goes, {end:.1f} s")
+    return opened
 
 
 def _several(paths: Bags | None) -> list[Path]:

@@ -33,6 +33,9 @@ class Evidence:
         self.measured = frozenset.intersection(*(e.measured for e in self.experiments))
         shown = np.array([name in self.measured or name == STROKE for name in OUTPUTS])
         self.sensors = np.where(shown, noise(stated), np.nan)
+        for name, size in zip(OUTPUTS, self.sensors, strict=True):
+            if size == 0.0:
+                raise InputError(f"the data sheet's noise of {name} is 0: an error is told from it")
         self.shown = shown
         self.told = available(self.measured)
         parameters = np.arange(self.told.size) != LINKAGE

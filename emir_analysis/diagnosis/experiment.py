@@ -2,13 +2,16 @@
 
 import math
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from emir_analysis.diagnosis.recording_checks import (
     check_before_command,
+    check_command,
     check_motion,
+    check_readings,
     check_sampling,
     check_values,
 )
@@ -35,6 +38,7 @@ SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and le
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
 REST = 0.2  # s at the start from which the initial pressure is averaged
 SHORTEST_REST = 0.1  # s
+ALIKE = 0.85  # of two names, in which they are probably the same (difflib)
 OWN_STROKE = 2.0  # times the resolver's error, by which a stroke that it does not show differs
 
 
@@ -137,11 +141,20 @@ def open_experiment(path: Path, signal_map: SignalMap, machine: Machine) -> Expe
         raise InputError(f"the signal map has no {COMMAND}, without which nothing can be told")
     if not {ANGLE, STROKE} & set(signal_map):
         raise InputError(f"the signal map has neither {ANGLE} nor {STROKE}; one is needed")
+    _check_names(signal_map)
     mapped = {name: signal_map[name] for name in SIGNALS if name in signal_map}
     for name, source in mapped.items():
         if source[2] != SIGNALS[name]:
             raise InputError(f"the signal map has {name} in {source[2]}, expected {SIGNALS[name]}")
     return experiment(str(path), load(path, mapped), machine)
+
+
+def _check_names(signal_map: SignalMap) -> None:
+    """Raise InputError for a name that is nearly that of a signal which the map has not."""
+    for name in signal_map:
+        near = get_close_matches(name, SIGNALS, n=1, cutoff=ALIKE)
+        if name not in SIGNALS and near and near[0] not in signal_map:
+            raise InputError(f"the signal map has {name}; is {near[0]} meant?")
 
 
 def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
@@ -156,6 +169,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
             f"{name}: {max(end - begin, 0.0):.1f} s that all signals share;"
             f" record at least {SHORTEST:.0f} s"
         )
+    check_command(name, recording[COMMAND], begin, end, machine)
     first = next(iter(sensors.values()))
     every = max(1, round(float(np.median(np.diff(first.time))) / COMMAND_STEP))
     period = every * COMMAND_STEP
@@ -169,6 +183,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     if STROKE not in shown:
         shown[STROKE] = _strokes(angle, machine)
     check_motion(name, angle, machine)
+    for signal in sensors.values():
+        check_readings(name, signal, time, angle, machine)
     check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     unknown = np.full(time.size, np.nan)

@@ -16,19 +16,14 @@ TYPE = "std_msgs/msg/Float64"
 SCHEMA = b"float64 data\n"
 
 
-def check_folder(folder: Path) -> None:
-    """Raise InputError where nothing may be written."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists already, and is not overwritten")
-
-
 def write_predictions(folder: Path, judged: Judged) -> None:
     """Write one MCAP recording for each judge recording and stage into the folder.
 
     In each, the topics /STAGE/SIGNAL and /measured/SIGNAL, stamped by the log time from 0, in SI
     units. Raises InputError for what cannot be written.
     """
-    stems = [Path(experiment.name).stem for experiment in judged.evidence.experiments]
+    names = [Path(experiment.name).name for experiment in judged.evidence.experiments]
+    stems = [name.removesuffix(".mcap") for name in names]
     for k, experiment in enumerate(judged.evidence.experiments):
         begin = stems[k] if stems.count(stems[k]) == 1 else f"{stems[k]}_{k + 1}"
         for stage in STAGES:

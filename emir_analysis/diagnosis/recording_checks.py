@@ -9,11 +9,25 @@ from emir_analysis.signals import Array, Signal
 from emir_plant.parameters import Machine
 
 LARGEST_GAP = 0.2  # s without a sample: the slow mode is still followed by interpolation
+LONGEST_HELD = 0.5  # s without a command that is published regularly, valve open ...
+MUCH_LONGER = 10.0  # ... and times the usual gap, that of ...
+USUAL = 0.95  # of all
+FROZEN = 1.0  # s that a sensor with noise shows the same number
+WILD = 0.5  # of nearly the whole range, by which one reading is off both of its neighbours
+NEARLY_ALL = 0.99
+FAR_OFF = 20.0  # times its noise: the same of a signal that hardly moves
+NOISE = {  # of the sensors that have some
+    "pressure_lifting": "pressure_noise",
+    "pressure_lowering": "pressure_noise",
+    "tip_deflection_angle": "deflection_noise",
+}
 LEAST_MOTION = 20  # resolver steps of travel below which nothing can be told from a recording
 AT_REST = 0.05  # of the whole travel: a boom that sinks through a leak before its first move
 LEAST_PRESSURE = 1e-3  # of the pump's pressure; a chamber that stays below is not in Pa
 LARGEST = {  # beyond which a signal is not in its unit, and the unit that it is likely in
-    "valve_command": (2.0, "per cent"),
+    "valve_command": (1.001, "per cent"),
+    "pressure_lifting": (1e9, "mPa"),
+    "pressure_lowering": (1e9, "mPa"),
     "joint_angle": (2.0 * math.pi, "deg"),
     "piston_stroke": (20.0, "mm"),
     "tip_deflection_angle": (1.0, "mrad or deg"),
@@ -29,6 +43,82 @@ def check_sampling(name: str, signal: Signal) -> None:
             f"{name}: {signal.name} has a gap of {gaps[widest]:.2f} s"
             f" at {signal.time[widest]:.2f} s; record without gaps"
         )
+
+
+def check_command(name: str, command: Signal, begin: float, end: float, machine: Machine) -> None:
+    """Raise InputError where the command, held between its messages, is not what was given.
+
+    From begin to end, s, of the sensors. A topic that repeats values is published regularly: it
+    has lost messages where none come for long while the valve is open.
+    """
+    time, value = command.time, command.value
+    if time[-1] < begin or time[0] > end:
+        raise InputError(
+            f"{name}: valve_command, {time[0]:.1f} ... {time[-1]:.1f} s, shares no time with the"
+            f" sensors, {begin:.1f} ... {end:.1f} s; stamp all by one clock"
+        )
+    gaps = np.diff(np.append(time, max(end, time[-1])))
+    usual = float(np.quantile(gaps, USUAL))
+    open_ = np.abs(value) > machine.valve.dead_zone
+    lost = open_ & (gaps > max(LONGEST_HELD, MUCH_LONGER * usual))
+    if np.any(np.diff(value) == 0.0) and np.any(lost):
+        first = int(np.argmax(lost))
+        raise InputError(
+            f"{name}: valve_command has a gap of {gaps[first]:.2f} s at {time[first]:.2f} s, where"
+            " the valve is open; record without gaps"
+        )
+
+
+def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine: Machine) -> None:
+    """Raise InputError for a sensor that shows single wild readings or freezes for a while.
+
+    angle: (n,) rad at times, (n,) s.
+    """
+    _check_wild(name, signal, machine)
+    starts = np.flatnonzero(np.append(True, np.diff(signal.value) != 0.0))
+    ends = np.append(starts[1:], signal.value.size) - 1
+    for first, last in zip(starts.tolist(), ends.tolist(), strict=True):
+        lasts = signal.time[last] - signal.time[first]
+        if lasts > FROZEN and _is_frozen(signal, first, last, time, angle, machine):
+            raise InputError(
+                f"{name}: {signal.name} stays at {signal.value[first]:.4g} for {lasts:.1f} s from"
+                f" {signal.time[first]:.2f} s while the boom moves; check the sensor and record"
+                " again, or leave it out of the signal map"
+            )
+
+
+def _check_wild(name: str, signal: Signal, machine: Machine) -> None:
+    value, aside = signal.value, np.diff(signal.value)
+    size = WILD * np.ptp(np.quantile(value, [1.0 - NEARLY_ALL, NEARLY_ALL]))
+    if signal.name in NOISE:
+        size = max(size, FAR_OFF * getattr(machine.sensors, NOISE[signal.name]))
+    alone = np.minimum(np.abs(aside[:-1]), np.abs(aside[1:]))
+    wild = (alone > size) & (aside[:-1] * aside[1:] < 0.0)
+    if size > 0.0 and np.any(wild):
+        k = int(np.argmax(wild)) + 1
+        raise InputError(
+            f"{name}: {signal.name} shows {value[k]:.4g} at {signal.time[k]:.3f} s alone,"
+            f" {value[k - 1]:.4g} before and {value[k + 1]:.4g} after; check the sensor's wiring"
+            " and record again"
+        )
+
+
+def _is_frozen(  # noqa: PLR0913, PLR0917 (of one stretch of a recording)
+    signal: Signal, first: int, last: int, time: Array, angle: Array, machine: Machine
+) -> bool:
+    """Tell whether a signal that shows one number from first to last ought to have moved.
+
+    Noise moves each reading of a sensor but at its end, as over an empty chamber. A resolver
+    shows one step for as long as the boom rests, but does not jump then.
+    """
+    value = signal.value
+    if signal.name not in NOISE:
+        after = value[min(last + 1, value.size - 1)]
+        return bool(abs(after - value[first]) > AT_REST * np.ptp(value))
+    if value[first] in {value.min(), value.max()}:
+        return False
+    during = angle[(time >= signal.time[first]) & (time <= signal.time[last])]
+    return bool(during.size and np.ptp(during) > LEAST_MOTION * machine.sensors.resolver_step)
 
 
 def check_motion(name: str, angle: Array, machine: Machine) -> None:

@@ -193,6 +193,29 @@ def test_a_sheet_without_tolerances_is_taken_at_its_word(folder: Path, tmp_path:
     assert result.parameters == {}
 
 
+def test_what_was_found_is_not_lost_with_a_judge_recording_of_no_use(
+    folder: Path, tmp_path: Path
+) -> None:
+    """Cut off itself, the first recording is read as far as it goes, and that is said."""
+    exact = re.sub(r".*{tol: .*\n|, tol: [0-9.]+", "", recorded.DATA_SHEET)
+    (tmp_path / "datasheet.yaml").write_text(exact)
+    machine = load_sheet(tmp_path / "datasheet.yaml").machine
+    recorded.record_machine(tmp_path / "a", machine, 14.0, seed=3)
+    whole = next((tmp_path / "a").glob("*.mcap")).read_bytes()
+    (tmp_path / "a.mcap").write_bytes(whole[:-100])
+    (tmp_path / "b.mcap").write_bytes(whole[: len(whole) // 10])
+    files = tmp_path / "datasheet.yaml", folder / "signals.yaml"
+    told: list[str] = []
+    with pytest.raises(InputError, match=r"b\.mcap.*is judged on the same"):
+        command(
+            tmp_path / "a.mcap", *files, tmp_path / "b.mcap", tmp_path / "a.json", None, told.append
+        )
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["verdict"] == "nothing_missing"
+    assert any("a.mcap: was cut off" in line for line in told)
+    assert any("nothing_missing" in line for line in told)
+
+
 def test_values_are_set_by_path(built: Machine) -> None:
     changed = with_values(built, {"valve.dead_zone": 0.2, "effects.payload.mass": 50.0})
     assert (changed.valve.dead_zone, changed.effects.payload.mass) == (0.2, 50.0)
@@ -217,6 +240,39 @@ def _moving(topics: Topics) -> None:
 def _late_command(topics: Topics) -> None:
     time, value = topics["valve_command"]
     topics["valve_command"] = (time[300:], value[300:])
+
+
+def _lost_commands(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    kept = (time < 4.0) | (time > 6.0)
+    topics["valve_command"] = (time[kept], value[kept])
+
+
+def _another_clock(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    topics["valve_command"] = (time + 3600.0, value)
+
+
+def _too_much(topics: Topics) -> None:
+    time, value = topics["valve_command"]
+    topics["valve_command"] = (time, 3.3 * value)
+
+
+def _frozen(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    value = np.where((time > 4.0) & (time < 7.0), value[300], value)
+    topics["pressure_lifting"] = (time, value)
+
+
+def _stuck_resolver(topics: Topics) -> None:
+    time, value = topics["joint_states"]
+    value = np.where((time > 4.0) & (time < 7.0), value[400], value)
+    topics["joint_states"] = (time, value)
+
+
+def _loose_contact(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    topics["pressure_lifting"] = (time, np.where(np.arange(time.size) == 700, 0.0, value))
 
 
 def _gap(topics: Topics) -> None:
@@ -263,6 +319,12 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_closed, "never leaves the dead zone"),
         (_moving, "a second at rest"),
         (_late_command, "moves before the first valve_command at 3.00 s"),
+        (_lost_commands, "valve_command has a gap of 2.0. s at 3.99 s"),
+        (_another_clock, "shares no time with the sensors"),
+        (_too_much, "valve_command reaches 1.32"),
+        (_frozen, "pressure_lifting stays at .* for 3.0 s from 4.0"),
+        (_stuck_resolver, "joint_angle stays at .* for 3.0 s from 4.0"),
+        (_loose_contact, "pressure_lifting shows 0 at 7.000 s alone"),
         (_gap, "gap of 1.0"),
         (_short, "record at least 10 s"),
         (_in_bar, "is it in bar"),
@@ -285,6 +347,21 @@ def test_a_recording_of_no_use_is_told_with_what_to_record(
     with pytest.raises(InputError, match=reason) as told:
         diagnose(folder, tmp_path / "bag")
     assert "\n" not in str(told.value)
+
+
+def test_what_is_no_recording_is_told(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "bag.mcap").write_text("time,angle\n")
+    with pytest.raises(InputError, match="not an MCAP file"):
+        diagnose(folder, tmp_path / "bag.mcap")
+
+
+def test_a_misspelt_signal_is_told(folder: Path, tmp_path: Path) -> None:
+    misspelt = recorded.SIGNAL_MAP.replace("pressure_lifting: {", "presure_lifting: {")
+    (tmp_path / "signals.yaml").write_text(misspelt)
+    (tmp_path / "a.mcap").touch()
+    files = folder / "datasheet.yaml", tmp_path / "signals.yaml"
+    with pytest.raises(InputError, match="presure_lifting; is pressure_lifting meant"):
+        command(tmp_path / "a.mcap", *files, None, None, None, lambda _: None)
 
 
 def test_a_damaged_recording_is_told(folder: Path, tmp_path: Path) -> None:

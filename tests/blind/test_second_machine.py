@@ -189,12 +189,14 @@ def test_any_two_effects_go_together_in_either_order() -> None:
         assert np.isfinite(machine.rates(x, 0.0, 0.0)).all(), (one.name, other.name)
 
 
-@pytest.mark.parametrize("file", ["foreign.py", "foreign_more.py"])
+@pytest.mark.parametrize("file", ["foreign.py", "foreign_more.py", "foreign_relatives.py"])
 def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
     source = (Path(__file__).parent / file).read_text()
     for effect in foreign_effects(source):
         machine = effect(STATED, effect.drawn(np.random.default_rng(1), STATED))
-        rates = machine.rates(machine.start(START.angle, START.p_s), 0.0, 0.0)
+        x = machine.start(START.angle, START.p_s)
+        rates = machine.rates(x, 0.0, 0.0)
         still = np.abs(rates[machine.modes]) < 1e-6 * np.abs(machine.boom.weight).max()
         assert np.all(still), effect.name
-        assert np.all(rates[:2] == 0.0), effect.name
+        leaks = any(machine.leaving(x[0], x[1]))
+        assert leaks or np.all(rates[:2] == 0.0), effect.name

@@ -43,6 +43,13 @@ def test_every_number_of_the_machine_has_a_source() -> None:
             "colour: there is no such parameter; there are geo",
         ),
         ("cylinder:", "cylinder: [", "not YAML"),
+        ("cylinder:", "cylinder: {}\ncylinder:", "cylinder stands twice"),
+        ("beta: {value: 5.0e+8", "beta: {tol: 15%, value: 5.0e+8", "tol = '15%': not a number"),
+        ("beta: {value: 5.0e+8", "beta: {tol: , value: 5.0e+8", "tol = None: not a number"),
+        ("beta: {value: 5.0e+8", "beta: {tol: 15, value: 5.0e+8", "tol = 15: a relative one"),
+        ("beta: {value: 5.0e+8", "beta: {tol: .nan, value: 5.0e+8", "tol = nan: a relative one"),
+        ("beta: {value: 5.0e+8", "beta: {tolerance: 1, value: 5.0e+8", "is given as tol"),
+        ("sections_per_arm: {value: 4", "sections_per_arm: {value: 4.5", "not a whole number"),
     ],
 )
 def test_a_bad_file_is_told_in_one_line(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -16,6 +16,7 @@ from emir_analysis.diagnosis.actuator.search import Progress, search
 from emir_analysis.diagnosis.result import write_json
 from emir_analysis.errors import InputError
 from emir_analysis.import_command import write_signals
+from emir_analysis.outputs import check_outputs
 from emir_analysis.signals import Array, Source, read_signal_map
 from emir_plant.actuator import load_actuator, write_actuator
 
@@ -39,7 +40,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     predictions: folder for the simulated runs beside the measured. Raises InputError or
     ParameterError, one line each, for anything that cannot be used.
     """
-    _check_folders(json, html, model_out, predictions)
+    check_outputs([json, html, model_out], predictions, [datasheet, signals])
     sheet = load_actuator(datasheet)
     if not sheet.ranges:
         raise InputError(f"{datasheet}: no parameter has a range, nothing to fit")
@@ -66,12 +67,6 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     if predictions is not None:
         _write_runs(predictions, shown, runs)
     return result
-
-
-def _check_folders(*files: Path | None) -> None:
-    for file in files:
-        if file is not None and not file.parent.is_dir():
-            raise InputError(f"{file}: no such folder {file.parent}")
 
 
 def _write_runs(folder: Path, shown: ActuatorRecord, runs: dict[str, Array]) -> None:

@@ -56,7 +56,7 @@ def _limited(spool: float, _: float) -> float:
 
 def test_the_noise_of_a_pressure_is_at_least_that_of_its_steps() -> None:
     """Third differences of a slow signal in coarse steps are mostly 0."""
-    slow = np.round(20.0 * np.sin(np.arange(500) / 60.0))
+    slow = np.round(20.0 * np.sin(np.arange(5000) / 600.0))
     assert noise_of(slow) == pytest.approx(1.0 / np.sqrt(12.0))
     fine = np.random.default_rng(1).standard_normal(5000)
     assert noise_of(fine) == pytest.approx(1.0, rel=0.05)

@@ -105,10 +105,11 @@ def _import(words: list[str]) -> int:
     parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
     o = parser.parse_args(words)
     try:
-        rows = (
-            None if o.rows is None else slice(*(int(n) if n else None for n in o.rows.split(":")))
-        )
-    except (TypeError, ValueError):
+        rows = None
+        if o.rows is not None:
+            first, behind = (int(n) if n else None for n in o.rows.split(":"))
+            rows = slice(first, behind)
+    except ValueError:
         raise InputError(f"--rows {o.rows}: not of the form A:B") from None
     made = import_csv(o.table, o.signals, o.out, rows)
     print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}")

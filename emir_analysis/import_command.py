@@ -31,6 +31,7 @@ from emir_msgs_py.topics import FLUID_PRESSURE, JOINT_STATE
 
 METADATA = "emir.import"  # the record that says where a recording came from
 LAST_STAMP = 2**31  # s, of a ROS stamp
+LAST_INDEX = 99  # of a field: a JointState with a hundred joints
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "sample": 1.0}
 UNITS = {  # a column's unit -> SI unit, factor
     "bar": ("Pa", 1e5), "mbar": ("Pa", 100.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6),
@@ -168,6 +169,8 @@ def _columns(file: Path) -> dict[str, Column]:
         if si != source.unit:
             raise InputError(f"{file}: {name}: a column in {unit} is no signal in {source.unit}")
         found[name] = Column(str(entry["column"]), source, factor)
+    if not found:
+        raise InputError(f"{file}: no signal in it")
     return found
 
 
@@ -203,7 +206,10 @@ def _step(source: Source) -> tuple[str, int | None]:
     match = _FIELD.fullmatch(source.field)
     if match is None:
         raise InputError(f"{source.topic}: {source.field!r} is not a field")
-    return match[1], None if match[2] is None else int(match[2])
+    index = None if match[2] is None else int(match[2])
+    if index is not None and index > LAST_INDEX:
+        raise InputError(f"{source.topic}: {source.field}: an index is at most {LAST_INDEX}")
+    return match[1], index
 
 
 def _message(kind: str, stamp: int, names: list[str], fields: dict[str, float]) -> dict[str, Any]:

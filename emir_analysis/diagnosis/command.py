@@ -45,9 +45,10 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     compared on it. predictions: folder for the simulated runs. Raises InputError or
     ParameterError, one line each, for anything that cannot be used.
     """
-    check_outputs([json, model_out, html], predictions, [datasheet, signals])
-    sheet = load_sheet(datasheet or data("joint1.yaml"))
     judges = _several(judge)
+    inputs = [datasheet, signals, *_several(bag), *judges]
+    check_outputs([json, model_out, html], predictions, inputs)
+    sheet = load_sheet(datasheet or data("joint1.yaml"))
     missing = [path for path in judges if not path.exists()]
     if missing:
         raise InputError(f"{missing[0]}: no such recording")

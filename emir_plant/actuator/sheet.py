@@ -24,6 +24,7 @@ from emir_plant.actuator.parameters import Actuator, Load, Valve
 MACHINE = "actuator"
 TIME_UNITS = ("sample", "s")
 GROUPS = ("valve", "load", "sensor")
+HEADINGS = ("machine", "time_unit", "effects")
 _BLANK = Actuator(Valve(gain=1.0, time_constant=1.0), Load(frequency=1.0))
 _NEEDED = ("valve.gain", "valve.time_constant", "load.frequency")
 
@@ -102,6 +103,10 @@ def _sheet(content: dict[Any, Any]) -> ActuatorSheet:
 
 def _entries(content: dict[Any, Any]) -> dict[str, dict[str, Any]]:
     """Return the sheet's entries by dotted path, each with its value."""
+    for name in content:
+        if name not in (*GROUPS, *HEADINGS):
+            there = ", ".join((*HEADINGS, *GROUPS))
+            raise ParameterError(f"{name}: there is no such entry; there are {there}")
     groups = {name: content[name] for name in GROUPS if name in content}
     effects = content.get("effects") or {}
     if not isinstance(effects, dict):

@@ -70,6 +70,22 @@ def test_definitions_and_hashes_are_those_of_ros(kind: str) -> None:
     assert DEFINITIONS[kind].split() == expected.split()
 
 
+@pytest.mark.parametrize("rows", ["5", "1:2:3", "a:b"])
+def test_rows_are_from_one_to_another(
+    rows: str, tmp_path: Path, signals: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [str(_table(tmp_path)), "--signals", str(signals), "--out", str(tmp_path / "bag")]
+    assert main(["import", *words, "--rows", rows]) == 1
+    assert "not of the form A:B" in capsys.readouterr().err
+
+
+def test_a_map_without_a_signal_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "map.yaml").write_text("time: {column: t, unit: ms}\n")
+    words = [str(_table(tmp_path)), "--signals", str(tmp_path / "map.yaml")]
+    assert main(["import", *words, "--out", str(tmp_path / "bag")]) == 1
+    assert "no signal in it" in capsys.readouterr().err
+
+
 def test_rows_without_times_are_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "map.yaml").write_text('u: {column: u, topic: /u, field: data, unit: "1"}\n')
     table = _table(tmp_path, "u;remark\n" + "".join(f"{k};x\n" for k in range(10)))
@@ -118,6 +134,7 @@ def test_a_table_of_no_use_is_told_in_one_line(
         ("{column: x, topic: /a, field: temperature, unit: K}", "no message for temperature"),
         ("{column: x, column_unit: bar, topic: /a, field: data, unit: m}", "no signal in m"),
         ("{column: x, topic: /rig/pressure, field: fluid_pressure, unit: Pa}", "in one field"),
+        ("{column: x, topic: /a, field: 'position[100]', unit: m}", "an index is at most 99"),
     ],
 )
 def test_a_map_of_no_use_is_told(

@@ -152,6 +152,7 @@ def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
         ("valve: {volume: 1.0}", "valve.volume: there is no such parameter"),
         ("effects: {magic: {size: 1.0}}", "effects.magic: there is no such effect"),
         ("time_unit: hours", "time_unit"),
+        ("efects: {}", "efects: there is no such entry"),
         (
             "valve: {gain: {value: 9, range: [1, 2]}, time_constant: 1.0}\nload: {frequency: 1.0}",
             "outside its range",

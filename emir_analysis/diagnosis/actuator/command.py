@@ -40,7 +40,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     predictions: folder for the simulated runs beside the measured. Raises InputError or
     ParameterError, one line each, for anything that cannot be used.
     """
-    check_outputs([json, html, model_out], predictions, [datasheet, signals])
+    check_outputs([json, html, model_out], predictions, [datasheet, signals, bag, judge])
     sheet = load_actuator(datasheet)
     if not sheet.ranges:
         raise InputError(f"{datasheet}: no parameter has a range, nothing to fit")

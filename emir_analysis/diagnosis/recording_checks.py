@@ -13,6 +13,7 @@ LONGEST_HELD = 0.5  # s without a command that is published regularly, valve ope
 MUCH_LONGER = 10.0  # ... and times the usual gap, that of ...
 USUAL = 0.95  # of all
 FROZEN = 1.0  # s that a sensor with noise shows the same number
+OFTEN = 0.05  # share of readings that repeat the one before, where steps are coarse
 WILD = 0.5  # of nearly the whole range, by which one reading is off both of its neighbours
 NEARLY_ALL = 0.99
 FAR_OFF = 20.0  # times its noise: the same of a signal that hardly moves
@@ -108,14 +109,16 @@ def _is_frozen(  # noqa: PLR0913, PLR0917 (of one stretch of a recording)
 ) -> bool:
     """Tell whether a signal that shows one number from first to last ought to have moved.
 
-    Noise moves each reading of a sensor but at its end, as over an empty chamber. A resolver
-    shows one step for as long as the boom rests, but does not jump then.
+    Noise moves each reading of a sensor but at its end, as over an empty chamber, or where its
+    steps are coarser than the noise: then others repeat, too. A resolver shows one step for as
+    long as the boom rests, but does not jump then.
     """
     value = signal.value
     if signal.name not in NOISE:
         after = value[min(last + 1, value.size - 1)]
         return bool(abs(after - value[first]) > AT_REST * np.ptp(value))
-    if value[first] in {value.min(), value.max()}:
+    others = np.delete(np.diff(value), slice(first, last))
+    if value[first] in {value.min(), value.max()} or np.mean(others == 0.0) > OFTEN:
         return False
     during = angle[(time >= signal.time[first]) & (time <= signal.time[last])]
     return bool(during.size and np.ptp(during) > LEAST_MOTION * machine.sensors.resolver_step)

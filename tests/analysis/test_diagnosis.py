@@ -12,10 +12,12 @@ import recorded
 from emir_analysis import bags
 from emir_analysis.diagnosis import Diagnosis, command, summary
 from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.recording_checks import check_readings
 from emir_analysis.diagnosis.unknowns import unknowns, with_values
 from emir_analysis.errors import InputError
+from emir_analysis.signals import Signal
 from emir_plant.parameters import Machine
-from emir_plant.sheet import load_sheet
+from emir_plant.sheet import joint1, load_sheet
 
 # of the tolerances: bending frequency, beta, nominal flow, lowering edge
 BUILT = np.array([0.5, -0.4, 0.6, -0.5])
@@ -347,6 +349,18 @@ def test_a_recording_of_no_use_is_told_with_what_to_record(
     with pytest.raises(InputError, match=reason) as told:
         diagnose(folder, tmp_path / "bag")
     assert "\n" not in str(told.value)
+
+
+def test_a_sensor_of_coarse_steps_may_stay_in_one() -> None:
+    """Steps of 1 bar, noise of a fifth: a steady pressure shows one number for seconds."""
+    machine, time = joint1(), np.arange(2000) * 0.01
+    angle = 0.8 + 0.01 * time
+    true = 50.0 + 10.0 * (time > 10.0) - 10.0 * (time < 1.0)
+    noise = 0.1 * np.random.default_rng(1).standard_normal(time.size)
+    pressure = 1e5 * np.round(true + noise)
+    assert np.all(pressure[200:900] == pressure[200])
+    signal = Signal("pressure_lifting", time, pressure, "Pa")
+    check_readings("run", signal, time, angle, machine)
 
 
 def test_what_is_no_recording_is_told(folder: Path, tmp_path: Path) -> None:

@@ -92,6 +92,7 @@ class Balances:
         self._areas = p["area_lifting"], p["area_lowering"]
         arm = linkage.lever_arms(self._smooth_angle, p)
         stroke = linkage.strokes(experiment.angle, p)
+        self._stated_stroke = stroke
         self._flow_per_rate = np.column_stack(
             [
                 (p["volume_lifting_0"] + p["area_lifting"] * stroke) / p["beta"],
@@ -210,7 +211,7 @@ class Balances:
         """Return the stroke that the machine has at the angle, (n,) m, as it is shown."""
         experiment = self._experiment
         if not experiment.own_stroke:
-            return np.asarray(linkage.strokes(experiment.angle, plant.record[0]))
+            return self._stated_stroke
         force = np.zeros(len(true))
         if {H, S} <= experiment.measured:
             force = true[:, 1] * self._areas[0] - true[:, 2] * self._areas[1]

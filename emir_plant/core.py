@@ -34,7 +34,7 @@ TIME = 5  # s, since the start of the run
 DROOP = 6  # Pa, of the supply pressure
 EDGES = 7  # 1, where the play of the spool has left the metering edges
 OFFSET = 8  # m, of the piston against the joint
-SHOWN_ANGLE, SHOWN_P_H, SHOWN_P_S, SHOWN_DEFLECTION = 9, 10, 11, 12  # by sensors that lag
+LATE_ANGLE, LATE_P_H, LATE_P_S, LATE_DEFLECTION = 9, 10, 11, 12  # states of sensors that lag
 DELAY_LINE = 13  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
@@ -168,11 +168,11 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
 @compiled_in_place
 def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
     bending = motion.tip_angle - motion.angle
-    rate = sensor_delay.rate
-    dx[SHOWN_ANGLE] = rate(motion.angle, x[SHOWN_ANGLE], p.sensor_delay_angle)
-    dx[SHOWN_P_H] = rate(x[P_H], x[SHOWN_P_H], p.sensor_delay_pressure_lifting)
-    dx[SHOWN_P_S] = rate(x[P_S], x[SHOWN_P_S], p.sensor_delay_pressure_lowering)
-    dx[SHOWN_DEFLECTION] = rate(bending, x[SHOWN_DEFLECTION], p.sensor_delay_deflection)
+    rate, dead = sensor_delay.rate, p.sensor_delay_dead_share
+    dx[LATE_ANGLE] = rate(motion.angle, x[LATE_ANGLE], p.sensor_delay_angle, dead)
+    dx[LATE_P_H] = rate(x[P_H], x[LATE_P_H], p.sensor_delay_pressure_lifting, dead)
+    dx[LATE_P_S] = rate(x[P_S], x[LATE_P_S], p.sensor_delay_pressure_lowering, dead)
+    dx[LATE_DEFLECTION] = rate(bending, x[LATE_DEFLECTION], p.sensor_delay_deflection, dead)
 
 
 @compiled_in_place

@@ -77,8 +77,8 @@ class Plant:
         bent = p["mode_joint"] * torque - load
         position[1:] = bent[1:] / p["mode_stiffness"][1:]
         position[0] = (angle - p["mode_joint"][1:] @ position[1:]) / p["mode_joint"][0]
-        x[core.SHOWN_ANGLE], x[core.SHOWN_P_H], x[core.SHOWN_P_S] = angle, high, low
-        x[core.SHOWN_DEFLECTION] = p["mode_tip_angle"] @ position - angle
+        x[core.LATE_ANGLE], x[core.LATE_P_H], x[core.LATE_P_S] = angle, high, low
+        x[core.LATE_DEFLECTION] = p["mode_tip_angle"] @ position - angle
         return x
 
     def derivative(self, state: Array, command: float) -> Array:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.signal import lfilter
 
 from emir_plant import core, linkage
@@ -45,12 +46,12 @@ class Readings(NamedTuple):
     deflection: Array
 
 
-# each sensor's field in the effects of sensors, and where the state holds what it shows lagging
-_LAGGING = {
-    "angle": core.SHOWN_ANGLE,
-    "pressure_lifting": core.SHOWN_P_H,
-    "pressure_lowering": core.SHOWN_P_S,
-    "deflection": core.SHOWN_DEFLECTION,
+# each sensor's field in the effects of sensors, and where the state holds what makes it late
+_LATE = {
+    "angle": core.LATE_ANGLE,
+    "pressure_lifting": core.LATE_P_H,
+    "pressure_lowering": core.LATE_P_S,
+    "deflection": core.LATE_DEFLECTION,
 }
 
 
@@ -64,8 +65,8 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
     """Return what the sensors show of the truth at a sample.
 
     The noise depends on the seed and the sample's number alone, so that a run can be repeated
-    from any point. state: the plant's, which holds what lagging sensors show. Raises ValueError
-    where one lags (effect `sensor_delay`) and no state is given.
+    from any point. state: the plant's, which holds what makes sensors late. Raises ValueError
+    where one is (effect `sensor_delay`) and no state is given.
     """
     machine = plant.machine
     sensors, cylinder = machine.sensors, machine.cylinder
@@ -76,11 +77,12 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
         "pressure_lowering": truth.pressure_lowering,
         "deflection": truth.tip_angle - truth.angle,
     }
-    for name, index in _LAGGING.items():
-        if getattr(machine.effects.sensor_delay, name) > 0.0:
+    late = machine.effects.sensor_delay
+    for name, index in _LATE.items():
+        if getattr(late, name) > 0.0:
             if state is None:
                 raise ValueError(f"effects.sensor_delay.{name}: the plant's state is needed")
-            true[name] = float(state[index])
+            true[name] = sensor_delay.shown(true[name], float(state[index]), late.dead_share)
     shown = {name: _distorted(value, name, machine) for name, value in true.items()}
     angle = resolver(shown["angle"], sensors.resolver_bits, sensors.resolver_span)
     lifting = shown["pressure_lifting"] + sensors.pressure_noise * noise[0]
@@ -99,7 +101,7 @@ def readings(plant: Plant, truth: Array, period: float) -> Readings:
     """Return what the plant's sensors show along a run, without noise and quantisation.
 
     truth: (n, len(Truth)), from a run that starts at rest. period: s, between its rows; a lag
-    takes the signals as straight between them.
+    takes the signals as straight between them, dead time as a cubic spline.
     """
     machine, cylinder = plant.machine, plant.machine.cylinder
     columns = Truth(*truth.T)
@@ -110,9 +112,7 @@ def readings(plant: Plant, truth: Array, period: float) -> Readings:
         "deflection": columns.tip_angle - columns.angle,
     }
     shown = {
-        name: _distorted(
-            _lagged(signal, getattr(machine.effects.sensor_delay, name), period), name, machine
-        )
+        name: _distorted(_late(signal, name, period, machine), name, machine)
         for name, signal in true.items()
     }
     lifting, lowering = shown["pressure_lifting"], shown["pressure_lowering"]
@@ -133,6 +133,24 @@ def undistorted(shown: float, name: str, machine: Machine) -> float:
     """Return what a sensor of a gain and a bias was given when it shows a value at rest."""
     gain, bias = machine.effects.sensor_gain, machine.effects.sensor_bias
     return float((shown - getattr(bias, name)) / (1.0 + getattr(gain, name)))
+
+
+def _late(signal: Array, name: str, period: float, machine: Machine) -> Array:
+    """Return a sensor's signal, (n,), behind its dead time and its lag."""
+    late = machine.effects.sensor_delay
+    delay = getattr(late, name)
+    if delay == 0.0:
+        return signal
+    dead, lag = late.dead_share * delay, (1.0 - late.dead_share) * delay
+    return _lagged(_delayed(signal, dead, period), lag, period)
+
+
+def _delayed(signal: Array, dead: float, period: float) -> Array:
+    """Return a signal, (n,), behind a dead time, s; before its start it was at rest."""
+    if dead == 0.0:
+        return signal
+    time = np.arange(signal.size) * period
+    return np.asarray(make_interp_spline(time, signal)(np.maximum(time - dead, 0.0)))
 
 
 def _lagged(signal: Array, lag: float, period: float) -> Array:

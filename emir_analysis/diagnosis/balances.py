@@ -166,20 +166,30 @@ class Balances:
         What they truly were if the sensors distort them as the machine's effects say.
         """
         effects = machine.effects
+        late = effects.sensor_delay
         columns, smooth = [], [self._smooth_angle, self._rate]
         for k, name in enumerate(("angle", H, S, "deflection")):
-            lag = getattr(effects.sensor_delay, name)
+            dead = late.dead_share * getattr(late, name)
+            lag = getattr(late, name) - dead
             bias, gain = getattr(effects.sensor_bias, name), getattr(effects.sensor_gain, name)
             column = self._shown[:, k]
             if lag > 0.0:
                 column = column + lag * self._slopes[:, k]
-            columns.append((column - bias) / (1.0 + gain))
+            columns.append((self._ahead(column, dead) - bias) / (1.0 + gain))
             if k == 0:
                 if lag > 0.0:
                     smooth[0] = smooth[0] + lag * self._rate
                     smooth[1] = smooth[1] + lag * np.gradient(self._rate, self._experiment.period)
+                smooth = [self._ahead(signal, dead) for signal in smooth]
                 smooth = [(smooth[0] - bias) / (1.0 + gain), smooth[1] / (1.0 + gain)]
         return np.column_stack([*columns, *smooth])
+
+    def _ahead(self, signal: Array, dead: float) -> Array:
+        """Return a signal, (n,), a dead time, s, earlier than it was shown."""
+        if dead == 0.0:
+            return signal
+        time = self._experiment.time
+        return np.interp(time + dead, time, signal)
 
     def _modelled(
         self, plants: Sequence[Plant], true: Array, angle: int = READ

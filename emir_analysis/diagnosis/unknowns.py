@@ -55,10 +55,14 @@ class Unknown:
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
 
     def at_end(self, x: float) -> bool:
-        """Tell whether x was led to the end of what is allowed, where that is not none at all."""
+        """Tell whether x was led to the end of what is allowed.
+
+        None at all, and all of a share, are no such end.
+        """
         led = abs(x - self.start) > END
         least = x - self.low < END and abs(self.value(self.low)) > ROUNDING * abs(self.scale)
-        return led and (least or self.high - x < END)
+        all_of_it = self.unit == "1" and math.isclose(self.value(self.high), 1.0)
+        return led and (least or (self.high - x < END and not all_of_it))
 
 
 @dataclass(frozen=True)

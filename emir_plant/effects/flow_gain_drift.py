@@ -9,18 +9,24 @@ from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled
 
 
+MINUTE = 60.0  # s
+
+
 @dataclass(frozen=True)
 class FlowGainDrift(Effect):
-    """Opening times 1 + change [1 - exp(-t / T)], t since the start of the run."""
+    """Opening times 1 + change [1 - exp(-t / T)] / [1 - exp(-1 min / T)], t since the start.
+
+    With a T beyond the run's length it is a straight line. The gain does not fall below 0.
+    """
 
     balance: ClassVar[Balance] = "valve"
     sizes: ClassVar[tuple[str, ...]] = ("change",)
     source: ClassVar[str] = (
-        "viscosity falls as the tank warms up over some minutes; 5-20 % of the flow"
+        "viscosity falls as the tank warms up; 5-20 % of the flow over some minutes"
     )
-    trial: ClassVar[dict[str, float]] = {"change": 0.2}
+    trial: ClassVar[dict[str, float]] = {"change": 0.05}
 
-    change: float = quantity("1", -0.9, 5.0, "relative, of the gain, in the end", default=0.0)
+    change: float = quantity("1", -0.9, 5.0, "relative, of the gain, in a minute", default=0.0)
     time_constant: float = quantity("s", 1.0, 1e5, "T, of warming up", default=300.0)
 
 
@@ -29,4 +35,6 @@ def gain(time: float, p: Any) -> float:
     """Return the factor on the opening at a time since the start of the run, s."""
     if p.flow_gain_drift_change == 0.0:
         return 1.0
-    return 1.0 - p.flow_gain_drift_change * math.expm1(-time / p.flow_gain_drift_time_constant)
+    warming = p.flow_gain_drift_time_constant
+    share = math.expm1(-time / warming) / math.expm1(-MINUTE / warming)
+    return max(1.0 + p.flow_gain_drift_change * share, 0.0)

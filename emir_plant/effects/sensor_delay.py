@@ -1,4 +1,4 @@
-"""A sensor that lags behind."""
+"""A sensor that shows late what was: by a lag, by dead time, or by both."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,9 +12,12 @@ SHORTEST = 5e-4  # s
 
 @dataclass(frozen=True)
 class SensorDelay(Effect):
-    """First-order lag, T dy/dt = true - y, one time constant for each sensor.
+    """What is slow comes late by T, one for each sensor.
 
-    A lag below SHORTEST acts as SHORTEST: it is beyond what the integration resolves.
+    dead_share of T is dead time (sampling, bus), the rest a first-order lag (filter). The state
+    of the integrated model has one number for each sensor: dead time acts there as the first-order
+    system that agrees with it to the second power of T times the frequency; `sensors.readings`
+    has it exactly. A lag below SHORTEST acts as SHORTEST: the integration does not resolve it.
     """
 
     balance: ClassVar[Balance] = "sensors"
@@ -24,23 +27,43 @@ class SensorDelay(Effect):
         "pressure_lowering",
         "deflection",
     )
-    source: ClassVar[str] = "filters of transducers and amplifiers, 10-50 ms"
+    source: ClassVar[str] = "filters of transducers and amplifiers, sampling and bus: 10-50 ms"
     trial: ClassVar[dict[str, float]] = {
         "angle": 0.02,
         "pressure_lifting": 0.02,
         "pressure_lowering": 0.02,
         "deflection": 0.02,
+        "dead_share": 0.5,
     }
 
-    angle: float = quantity("s", 0.0, 1.0, "lag of the resolver", default=0.0)
-    pressure_lifting: float = quantity("s", 0.0, 1.0, "lag of p_H", default=0.0)
-    pressure_lowering: float = quantity("s", 0.0, 1.0, "lag of p_S", default=0.0)
-    deflection: float = quantity("s", 0.0, 1.0, "lag of the gauges", default=0.0)
+    angle: float = quantity("s", 0.0, 1.0, "T of the resolver", default=0.0)
+    pressure_lifting: float = quantity("s", 0.0, 1.0, "T of p_H", default=0.0)
+    pressure_lowering: float = quantity("s", 0.0, 1.0, "T of p_S", default=0.0)
+    deflection: float = quantity("s", 0.0, 1.0, "T of the gauges", default=0.0)
+    dead_share: float = quantity("1", 0.0, 1.0, "share of T that is dead time", default=0.0)
 
 
 @compiled
-def rate(true: float, shown: float, lag: float) -> float:
-    """Return dy/dt of what a sensor with a lag, s, shows; signals in any unit."""
-    if lag == 0.0:
+def rate(true: float, lagging: float, delay: float, dead_share: float) -> float:
+    """Return dz/dt of the state z of a sensor that shows late by a delay, s; signals in any unit.
+
+    (1 - a) T dz/dt = true - z, and the sensor shows z + a / (1 - a) (z - true).
+    """
+    if delay == 0.0:
         return 0.0
-    return (true - shown) / max(lag, SHORTEST)
+    return (true - lagging) / max((1.0 - _ahead(dead_share)) * delay, SHORTEST)
+
+
+def shown(true: float, lagging: float, dead_share: float) -> float:
+    """Return what a late sensor shows, from the truth and its state."""
+    ahead = _ahead(dead_share)
+    return lagging + ahead / (1.0 - ahead) * (lagging - true)
+
+
+@compiled
+def _ahead(dead_share: float) -> float:
+    """Return a of (1 - a T s) / (1 + (1 - a) T s), which is late by T whatever a.
+
+    A lag has a = 0, dead time 1/2; between, the powers up to (T s)^2 are those of both in a row.
+    """
+    return dead_share * (1.0 - 0.5 * dead_share)

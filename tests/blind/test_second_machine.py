@@ -1,6 +1,7 @@
 """The blind test's machine beside the project's: two formulations, two integrators, one physics."""
 
 import ast
+import math
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -136,7 +137,7 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
     hidden.CommandDelay: ({"late": 0.045}, {"delay": 0.045}),
     hidden.FlowGainDrift: (
         {"drift": 0.3, "drift_time": 10.0},
-        {"change": 0.3, "time_constant": 10.0},
+        {"change": -0.3 * math.expm1(-6.0), "time_constant": 10.0},  # in a minute
     ),
     hidden.LogicBlockFault: ({"threshold_off": 3e6}, {"threshold": 3e6}),
     hidden.SensorBias: ({"bias_angle": 0.01}, {"angle": 0.01}),

@@ -549,12 +549,20 @@ def test_a_state_carries_all_memory(name: str, dt: float) -> None:
         state = after
 
 
-def test_gain_drifts_to_its_end_value() -> None:
-    p = _with(flow_gain_drift={"change": 0.2, "time_constant": 300.0}).record[0]
+def test_gain_has_drifted_by_its_change_after_a_minute_and_ends() -> None:
+    p = _with(flow_gain_drift={"change": 0.2, "time_constant": 60.0}).record[0]
     assert flow_gain_drift.gain(0.0, p) == 1.0
-    assert flow_gain_drift.gain(300.0, p) == pytest.approx(1.0 + 0.2 * (1.0 - math.exp(-1.0)))
-    assert flow_gain_drift.gain(1e6, p) == pytest.approx(1.2)
-    assert terms.opening(-0.5, 1e6, p) == pytest.approx(-0.6)
+    assert flow_gain_drift.gain(60.0, p) == pytest.approx(1.2)
+    end = 0.2 / (1.0 - math.exp(-1.0))
+    assert flow_gain_drift.gain(1e6, p) == pytest.approx(1.0 + end)
+    assert terms.opening(-0.5, 1e6, p) == pytest.approx(-0.5 * (1.0 + end))
+
+
+def test_gain_that_drifts_long_goes_straight_and_never_below_nothing() -> None:
+    p = _with(flow_gain_drift={"change": -0.3, "time_constant": 1e5}).record[0]
+    assert flow_gain_drift.gain(30.0, p) == pytest.approx(0.85, abs=1e-4)
+    assert flow_gain_drift.gain(180.0, p) == pytest.approx(0.1, abs=1e-3)
+    assert flow_gain_drift.gain(600.0, p) == 0.0
 
 
 # logic block
@@ -590,14 +598,21 @@ def test_gain_and_bias_touch_one_sensor_and_what_is_computed_from_it(signal: str
     assert np.array_equal(shown.force, force)
 
 
-def test_predicted_readings_are_those_measured_but_for_noise_and_quantisation() -> None:
-    """With bias, gain and lag at work, along a run in steps of the sensors' period."""
+@pytest.mark.parametrize("dead_share", [0.0, 0.5, 1.0])
+def test_predicted_readings_are_those_measured_but_for_noise_and_quantisation(
+    dead_share: float,
+) -> None:
+    """With bias, gain and delay at work, along a run in steps of the sensors' period.
+
+    Dead time is exact in the ones and a first-order system in the others.
+    """
     machine = with_values(
         MACHINE,
         {
             "effects.sensor_delay.pressure_lifting": 0.05,
             "effects.sensor_delay.angle": 0.2,
             "effects.sensor_delay.deflection": 0.03,
+            "effects.sensor_delay.dead_share": dead_share,
             "effects.sensor_gain.pressure_lowering": 0.05,
             "effects.sensor_bias.deflection": 1e-3,
             "sensors.pressure_noise": 0.0,
@@ -615,11 +630,23 @@ def test_predicted_readings_are_those_measured_but_for_noise_and_quantisation() 
     run = plant.simulate(plant.initial(FORTY_FIVE, 20e5), commands, dt)
     predicted = np.stack(readings(plant, run, dt), axis=1)
     span = np.ptp(predicted, axis=0)
-    assert (np.abs(predicted - np.array(shown)).max(axis=0) < 1e-3 * span).all()
+    error = np.sqrt(np.mean((predicted - np.array(shown)) ** 2, axis=0))
+    assert (error < (0.02 if dead_share else 1e-3) * span).all()
 
 
-def test_a_lag_shows_a_ramp_late_by_its_time() -> None:
-    plant = _with(sensor_delay={"pressure_lifting": 0.05})
+def test_a_sensor_of_dead_time_shows_what_was() -> None:
+    plant = _with(sensor_delay={"pressure_lifting": 0.05, "dead_share": 1.0})
+    truth = np.zeros((500, len(Truth._fields)))
+    time = np.arange(500) * 1e-2
+    truth[:, T["pressure_lifting"]] = 1e7 + 1e6 * np.sin(5.0 * time) ** 2
+    shown = readings(plant, truth, 1e-2).pressure_lifting
+    expected = 1e7 + 1e6 * np.sin(5.0 * np.maximum(time - 0.05, 0.0)) ** 2
+    assert shown == pytest.approx(expected, abs=1e-3 * BAR)
+
+
+@pytest.mark.parametrize("dead_share", [0.0, 0.3, 1.0])
+def test_a_late_sensor_shows_a_ramp_late_by_its_time(dead_share: float) -> None:
+    plant = _with(sensor_delay={"pressure_lifting": 0.05, "dead_share": dead_share})
     truth = np.zeros((500, len(Truth._fields)))
     truth[:, T["pressure_lifting"]] = ramp = np.arange(500) * 1e4
     shown = readings(plant, truth, 1e-2).pressure_lifting

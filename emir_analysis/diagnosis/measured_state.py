@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
 from emir_plant import core
-from emir_plant.effects import command_delay, linkage_error, terms
+from emir_plant.effects import command_delay, linkage_error, terms, vessel_compliance
 from emir_plant.hydraulics import chambers
 from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
 
@@ -74,10 +74,10 @@ def _swept(turned: float, measured: Array, p: Any) -> tuple[float, float]:
     stroke = linkage_error.stroke(measured[2], p)
     moved = linkage_error.lever_arm(measured[2], p) * turned
     volume = chambers.volume_lifting(stroke, p)
-    stiffness = terms.stiffness(measured[0], volume, p.vessel_compliance_lifting, p)
+    stiffness = terms.stiffness(measured[0], volume, vessel_compliance.lifting(volume, p), p)
     lifting = chambers.pressure_rate(-p.area_lifting * moved, volume, measured[0], stiffness)
     volume = chambers.volume_lowering(stroke, p)
-    stiffness = terms.stiffness(measured[1], volume, p.vessel_compliance_lowering, p)
+    stiffness = terms.stiffness(measured[1], volume, vessel_compliance.lowering(volume, p), p)
     lowering = chambers.pressure_rate(p.area_lowering * moved, volume, measured[1], stiffness)
     return lifting, lowering
 

@@ -8,7 +8,6 @@ from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled
 
-
 MINUTE = 60.0  # s
 
 

@@ -25,6 +25,7 @@ from emir_plant.effects import (
     logic_block_fault,
     terms,
     valve_hysteresis,
+    vessel_compliance,
 )
 from emir_plant.hydraulics import logic_block, valve
 from emir_plant.parameters import Machine
@@ -392,6 +393,25 @@ def test_a_hose_is_a_spring_in_series_with_the_oil() -> None:
     found = terms.stiffness(100e5, volume, compliance, p)
     assert 1.0 / found == pytest.approx(1.0 / p["beta"] + 0.010 / (volume * 0.7e9))
     assert terms.stiffness(10e5, volume, compliance, p) == found  # whatever the pressure
+    assert vessel_compliance.lifting(volume, p) == compliance  # whatever the volume
+
+
+@pytest.mark.parametrize("softer", [0.5, -0.25])
+def test_a_chamber_of_another_stiffness_takes_up_more_the_larger_it_is(softer: float) -> None:
+    """1/K = (1 + softer) / K_stated at any volume."""
+    stated = MACHINE.cylinder
+    compliance = softer * stated.volume_lowering_0 / stated.beta
+    p = _with(vessel_compliance={"lowering": compliance, "wall_share": 1.0}).record[0]
+    for volume in np.array([0.3, 1.0, 2.5]) * stated.volume_lowering_0:
+        taken_up = vessel_compliance.lowering(volume, p)
+        found = terms.stiffness(100e5, volume, taken_up, p)
+        assert found == pytest.approx(stated.beta / (1.0 + softer))
+        assert vessel_compliance.lifting(volume, p) == 0.0
+
+
+def test_a_chamber_never_turns_rigid() -> None:
+    p = _with(vessel_compliance={"lifting": -1e-9}).record[0]
+    assert terms.stiffness(100e5, 0.02, -1e-9, p) == pytest.approx(5.0 * p["beta"])
 
 
 # supply and valve

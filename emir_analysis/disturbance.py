@@ -12,7 +12,7 @@ The new machine has as many modes as the old one: shape and motion are met as we
 The static share of the modes left out in the TCP's deflection follows the load at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from emir_common.parameter_tree import with_values
 from emir_plant import core
 from emir_plant.boom import boom_modes, rigid_arm_joints, section_model
+from emir_plant.effects.external_load import ExternalLoad
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 
@@ -36,8 +37,8 @@ class LoadChange:
 
 def push(machine: Machine, force: float, start: float, duration: float) -> Machine:
     """Return the machine with a push at the TCP, N up, from a start, s, for a duration, s."""
-    values = {"force": force, "frequency": 0.0, "phase": 0.0, "start": start, "duration": duration}
-    return with_values(machine, {f"effects.external_load.{k}": v for k, v in values.items()})
+    load = ExternalLoad(force=force, start=start, duration=duration)
+    return replace(machine, effects=replace(machine.effects, external_load=load))
 
 
 def reloaded(plant: Plant, state: Array, payload: float) -> tuple[Plant, Array]:

@@ -21,13 +21,20 @@ WEAK = 1e-9  # relative to what the strongest window's load changes: less is as 
 
 
 class Load(NamedTuple):
-    """F cos(2 pi f (t - begin) + phase): N, Hz, rad, s, s."""
+    """M + F cos(2 pi f (t - begin) + phase): N, N, Hz, rad, s, s, s."""
 
     force: float
+    mean: float
     frequency: float
     phase: float
     begin: float
+    rise: float
     duration: float
+
+
+def constant(force: float, begin: float, duration: float) -> Load:
+    """Return a load of a force, N, that sets in, s, and ends at once after a duration, s."""
+    return Load(force, 0.0, 0.0, 0.0, begin, 0.0, duration)
 
 
 class Response(NamedTuple):
@@ -82,12 +89,15 @@ def steady(response: Response) -> tuple[Load, Load]:
         i, j = int(first[best]), int(last[best])
         duration = FOR_EVER if stays else float(begin[j] - begin[i])
         force = float(along[best] / square[best])
-        found.append(Load(force, 0.0, 0.0, float(begin[i]), duration))
+        found.append(constant(force, float(begin[i]), duration))
     return found[0], found[1]
 
 
 def swings(response: Response) -> tuple[Load, Load]:
-    """Return the swinging load from the start on and the one setting in later that explain most."""
+    """Return the load from the start on and the one setting in later that explain most.
+
+    Each swings about a mean of its own.
+    """
     begin, gram, right = response
     window = float(begin[1] - begin[0])
     length = window * begin.size
@@ -95,15 +105,15 @@ def swings(response: Response) -> tuple[Load, Load]:
     always, later = [], []
     for f in np.arange(1, int(FASTEST * FREQUENCIES * length)) / (FREQUENCIES * length):
         wave = np.exp(2j * np.pi * f * (begin + 0.5 * window))
-        columns = np.stack([wave.real, wave.imag])
+        columns = np.stack([wave.real, wave.imag, np.ones(begin.size)])
         # sums from each begin to the end: the normal equations of all begins at once
         along = _to_the_end(columns * right)[:, :-FEWEST]
-        normal = np.empty((along.shape[1], 2, 2))
+        normal = np.empty((along.shape[1], len(columns), len(columns)))
         for row, one in enumerate(columns):
             for column, other in enumerate(columns):
                 both = one * (after @ other) + other * (behind @ one)
                 normal[:, row, column] = _to_the_end(both)[:-FEWEST]
-        normal += WEAK * gram.max() * np.eye(2)
+        normal += WEAK * gram.max() * np.eye(len(columns))
         solved = np.linalg.solve(normal, along.T[:, :, None])[:, :, 0]
         gained = np.sum(solved * along.T, axis=1)
         late = 1 + int(np.argmax(gained[1:]))
@@ -113,10 +123,10 @@ def swings(response: Response) -> tuple[Load, Load]:
 
 
 def _swing(frequency: float, parts: Array, begin: float) -> Load:
-    """Return a swing from the parts of it, (2,) N, that go as cosine and sine of time."""
-    a, b = parts
+    """Return a swing from the parts of it, (3,) N: as cosine and sine of time, and its mean."""
+    a, b, mean = parts
     phase = math.remainder(math.atan2(-b, a) + 2.0 * math.pi * frequency * begin, 2.0 * math.pi)
-    return Load(math.hypot(a, b), float(frequency), phase, begin, FOR_EVER)
+    return Load(math.hypot(a, b), float(mean), float(frequency), phase, begin, 0.0, FOR_EVER)
 
 
 def _to_the_end(values: Array) -> Array:

@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit
-from emir_analysis.diagnosis.loads import FOR_EVER, Load, likely, of_force, of_steps
+from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -207,8 +207,8 @@ def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
     force = at_tip * np.nan_to_num(force)
-    constant = Load(float(np.mean(force)), 0.0, 0.0, BEFORE, FOR_EVER)
-    return [constant, *likely(of_force(evidence.time[: force.size], force))]
+    always = constant(float(np.mean(force)), BEFORE, FOR_EVER)
+    return [always, *likely(of_force(evidence.time[: force.size], force))]
 
 
 def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) -> list[Load]:
@@ -217,7 +217,7 @@ def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) ->
     members = loaded.unknowns.members[known.x.size :]
     size = SMALL * members[0].value(members[0].start)  # of the force
     begin = np.arange(0.0, float(evidence.experiments[0].time[-1]), LOAD_STEP)
-    steps = [_fields(members, Load(size, 0.0, 0.0, float(t), FOR_EVER)) for t in begin]
+    steps = [_fields(members, constant(size, float(t), FOR_EVER)) for t in begin]
     nothing = left([known])[0]
     changed = left([loaded.at(np.append(known.x, own)) for own in steps]) - nothing
     return likely(of_steps(begin, np.nan_to_num(changed / size), -np.nan_to_num(nothing)))
@@ -286,7 +286,7 @@ def _starts(
 
 
 def _fields(members: tuple[Unknown, ...], load: Load) -> Array:
-    """Return a load as the vector, (5,), of its effect's fields."""
+    """Return a load as the vector, (7,), of its effect's fields."""
     return np.array([unknown.at(value) for unknown, value in zip(members, load, strict=True)])
 
 

@@ -11,35 +11,50 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class ExternalLoad(Effect):
-    """Force across the boom at the TCP, up positive: F cos(2 pi f (t - t_0) + phase).
+    """Force across the boom at the TCP, up positive: M + F cos(2 pi f (t - t_0) + phase).
 
-    It acts from t_0 for a duration; with t_0 before the run the machine rests under it. f = 0
-    gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one.
+    It sets in at t_0, all of it after a rise, and after its duration it falls as it rose; both
+    along straight lines. With t_0 long before the run the machine rests under it. f = 0 gives a
+    constant load or, with a short duration, a pulse; f > 0 a harmonic one about a mean M.
     """
 
     balance: ClassVar[Balance] = "force"
-    sizes: ClassVar[tuple[str, ...]] = ("force",)
+    sizes: ClassVar[tuple[str, ...]] = ("force", "mean")
     source: ClassVar[str] = "wind pressure 0.3 kPa on a boom of 15 m^2 gives about 2 kN at the TCP"
     trial: ClassVar[dict[str, float]] = {
         "force": 1e3,
+        "mean": 1e3,
         "frequency": 0.2,
         "phase": 0.5,
         "start": 1.0,
+        "rise": 0.5,
         "duration": 1e3,
     }
 
     force: float = quantity("N", -1e5, 1e5, "F", default=0.0)
+    mean: float = quantity("N", -1e5, 1e5, "M", default=0.0)
     frequency: float = quantity("Hz", 0.0, 20.0, "f; 0: constant while it acts", default=0.0)
     phase: float = quantity("rad", -6.3, 6.3, "at the start", default=0.0)
     start: float = quantity("s", -1e6, 1e6, "t_0, since the start of the run", default=0.0)
+    rise: float = quantity("s", 0.0, 1e3, "from nothing to all of it, and back", default=0.0)
     duration: float = quantity("s", 1e-3, 1e6, "how long it acts", default=1e6)
 
 
 @compiled
 def force(time: float, p: Any) -> float:
     """Return the force at the TCP, N, at a time since the start of the run, s."""
-    since = time - p.external_load_start
-    if p.external_load_force == 0.0 or since < 0.0 or since >= p.external_load_duration:
+    if p.external_load_force == 0.0 and p.external_load_mean == 0.0:
         return 0.0
+    since = time - p.external_load_start
+    share = _risen(since, p.external_load_rise)
+    share -= _risen(since - p.external_load_duration, p.external_load_rise)
     angle = 2.0 * math.pi * p.external_load_frequency * since + p.external_load_phase
-    return p.external_load_force * math.cos(angle)
+    return share * (p.external_load_mean + p.external_load_force * math.cos(angle))
+
+
+@compiled
+def _risen(since: float, rise: float) -> float:
+    """Return the share of a load that has come, at a time, s, since it set in."""
+    if since < 0.0:
+        return 0.0
+    return 1.0 if since >= rise else since / rise

@@ -202,7 +202,8 @@ def test_a_black_box_may_be_trained_where_a_signal_stays_as_it_is(angle: float) 
 
 def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:
     """No window of the last third knows of a load that acted from 2 to 6 s of 16 s."""
-    sizes = {"force": 1500.0, "frequency": 0.0, "phase": 0.0, "start": 2.0, "duration": 4.0}
+    sizes = {"force": 1500.0, "start": 2.0, "duration": 4.0}
+    sizes |= dict.fromkeys(("mean", "frequency", "phase", "rise"), 0.0)
     pulse = {f"effects.external_load.{name}": value for name, value in sizes.items()}
     searched, sheet, evidence = search(pulse)
     plain = fit_balances(trial(sheet, ()), evidence, searched.floor)

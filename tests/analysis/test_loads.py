@@ -14,27 +14,28 @@ OSCILLATOR = lti([1.0], [1.0, 2.0 * 0.02 * 4.4, 4.4**2])  # 0.7 Hz, hardly dampe
 SAMPLES = np.arange(0.0, 40.0, 0.02)  # s
 
 
-def swinging(size: float, frequency: float, phase: float, begin: float) -> Array:
-    """Return a load that swings from its begin on."""
+def swinging(size: float, frequency: float, phase: float, begin: float, mean: float = 0.0) -> Array:
+    """Return a load that swings about a mean from its begin on."""
     wave = np.cos(2.0 * math.pi * frequency * (TIME - begin) + phase)
-    return np.where(begin <= TIME, size * wave, 0.0)
+    return np.where(begin <= TIME, mean + size * wave, 0.0)
 
 
-def test_a_load_that_starts_to_swing_is_seen_beside_a_constant_and_noise() -> None:
+@pytest.mark.parametrize("mean", [0.0, 40e3])
+def test_a_load_that_starts_to_swing_is_seen_beside_a_constant_and_noise(mean: float) -> None:
     noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
-    _, late = swings(of_force(TIME, swinging(20e3, 0.21, -1.2, 12.0) + 30e3 + noise))
-    size, frequency, phase, begin, _ = late
-    assert size == pytest.approx(20e3, rel=0.05)
-    assert frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
-    assert begin == pytest.approx(12.0, abs=0.5)
-    off = 2.0 * math.pi * frequency * (12.0 - begin) + phase + 1.2
+    _, late = swings(of_force(TIME, swinging(20e3, 0.21, -1.2, 12.0, mean) + 30e3 + noise))
+    assert late.force == pytest.approx(20e3, rel=0.05)
+    assert late.mean == pytest.approx(mean, abs=2e3)
+    assert late.frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert late.begin == pytest.approx(12.0, abs=0.5)
+    off = 2.0 * math.pi * late.frequency * (12.0 - late.begin) + late.phase + 1.2
     assert abs(math.remainder(off, 2.0 * math.pi)) < 0.3
 
 
 def test_a_load_that_swings_all_the_time_is_seen() -> None:
     always, _ = swings(of_force(TIME, swinging(20e3, 0.21, -1.2, 0.0)))
-    assert always[1] == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
-    assert always[3] == 0.0
+    assert always.frequency == pytest.approx(0.21, abs=1.0 / (4.0 * TIME[-1]))
+    assert always.begin == 0.0
 
 
 def gust(size: float, begin: float, end: float, time: Array) -> Array:

@@ -297,6 +297,14 @@ def test_a_load_acts_from_its_start_for_its_duration() -> None:
     assert values == pytest.approx([1e3, 0.0, -1e3, 1e3], abs=1e-9)
 
 
+def test_a_load_rises_and_falls_along_straight_lines_about_a_mean() -> None:
+    wind = {"force": 500.0, "mean": 1e3, "frequency": 0.25, "start": 2.0, "duration": 8.0}
+    p = _with(external_load=wind | {"rise": 2.0}).record[0]
+    values = [external_load.force(t, p) for t in (1.9, 3.0, 4.0, 6.0, 10.0, 11.0, 12.1)]
+    # after 1, 2, 4, 8 and 9 s a swing of 4 s stands at 0, -1, 1, 1 and 0
+    assert values == pytest.approx([0.0, 500.0, 500.0, 1500.0, 1500.0, 500.0, 0.0], abs=1e-9)
+
+
 # kinematics
 
 

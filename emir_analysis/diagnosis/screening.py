@@ -74,7 +74,10 @@ class _Left:
         """Return the same, (m, n), and the known x, (m, k), with x inside its bounds."""
         residuals = self._augmented(trials)
         wanted = np.nan_to_num(-residuals @ self._basis, posinf=0.0, neginf=0.0)
-        changes = np.array([lsq_linear(self._triangle, row, self._room).x for row in wanted])
+        changes = np.linalg.solve(self._triangle, wanted.T).T
+        beyond = np.any((changes < self._room[0]) | (changes > self._room[1]), axis=1)
+        for k in np.flatnonzero(beyond):
+            changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
         return residuals + changes @ self._triangle.T @ self._basis.T, self._x + changes
 
     def _augmented(self, trials: list[Trial]) -> Array:
@@ -94,11 +97,11 @@ class _Candidate:
         self.effect = start.effects[-1]
         low, high = (bound[known:] for bound in start.unknowns.bounds)
         points = np.clip(starts, low, high)
-        residuals = self._model(points)
+        residuals = self._inside(points)
         best = int(np.argmin([_soft(row) for row in residuals]))
         self.bounds, self.x, self.at_best = (low, high), points[best], residuals[best]
         steps = np.where(self.x + left.step_size > high, -left.step_size, left.step_size)
-        self.slopes = (self._model(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
+        self.slopes = (self._inside(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
         change, self.expected = _least(self.at_best, self.slopes, low - self.x, high - self.x)
         self._reached = self.x + change
 
@@ -137,9 +140,6 @@ class _Candidate:
         known = self._left.inside(self._trials(own[None]))[1][0]
         return self._start.at(np.append(known, own))
 
-    def _model(self, points: Array) -> Array:
-        return self._left(self._trials(points))
-
     def _inside(self, points: Array) -> Array:
         return self._left.inside(self._trials(points))[0]
 
@@ -163,7 +163,7 @@ def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -
     For two that help only together. Which pairs are fitted is decided to first order.
     """
     left = _Left(known, _in_balances(evidence, floor), STEP)
-    nothing = left([known])[0]
+    nothing = left.inside([known])[0][0]
     begun = _begun(known, sheet, _by_balance(known, evidence), left)
     pairs = sorted(combinations(begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing))
     together = []

@@ -16,6 +16,7 @@ FASTEST = 0.5  # Hz: faster swings average out over the windows of the force bal
 FREQUENCIES = 4  # that are tried in a bandwidth of 1 / duration
 FEWEST = 8  # windows over which a load has to swing
 SHORTEST = 4  # windows over which a load has to last
+RISES = (2.0, 4.0, 8.0, 16.0, 32.0)  # s, over which a load that stays may come
 FOR_EVER = 1e6  # s
 WEAK = 1e-9  # relative to what the strongest window's load changes: less is as good as nothing
 
@@ -68,8 +69,12 @@ def of_steps(begin: Array, changed: Array, missing: Array) -> Response:
 
 
 def likely(response: Response) -> list[Load]:
-    """Return the best swing from the start on and later, the best gust and load that stays."""
-    return [*swings(response), *steady(response)]
+    """Return the best of each kind of load.
+
+    A swing from the start on and one from later on, a gust, a load that stays, one that comes
+    slowly and stays.
+    """
+    return [*swings(response), *steady(response), slow(response)]
 
 
 def steady(response: Response) -> tuple[Load, Load]:
@@ -91,6 +96,22 @@ def steady(response: Response) -> tuple[Load, Load]:
         force = float(along[best] / square[best])
         found.append(constant(force, float(begin[i]), duration))
     return found[0], found[1]
+
+
+def slow(response: Response) -> Load:
+    """Return the load that comes along a straight line and stays that explains most."""
+    begin, gram, right = response
+    middle = begin + 0.5 * (begin[1] - begin[0])
+    best = (-1.0, constant(0.0, float(begin[0]), FOR_EVER))
+    for rise in RISES:
+        share = np.clip((middle - begin[:-SHORTEST, None]) / rise, 0.0, 1.0)
+        square = np.maximum(np.sum((share @ gram) * share, axis=1), WEAK * gram.max())
+        along = share @ right
+        gained = along**2 / square
+        k = int(np.argmax(gained))
+        load = constant(float(along[k] / square[k]), float(begin[k]), FOR_EVER)
+        best = max(best, (float(gained[k]), load._replace(rise=rise)))
+    return best[1]
 
 
 def swings(response: Response) -> tuple[Load, Load]:

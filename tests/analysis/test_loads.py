@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim, lti
 
-from emir_analysis.diagnosis.loads import FOR_EVER, of_force, of_steps, steady, swings
+from emir_analysis.diagnosis.loads import FOR_EVER, of_force, of_steps, slow, steady, swings
 from emir_analysis.signals import Array
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
@@ -55,6 +55,15 @@ def test_a_load_that_stays_lasts_for_ever() -> None:
     _, found = steady(of_force(TIME, gust(3e3, 31.0, 1e3, TIME)))
     assert found.begin == pytest.approx(31.0, abs=0.25)
     assert found.duration == FOR_EVER
+
+
+def test_a_load_that_comes_slowly_is_seen_beside_a_constant_and_noise() -> None:
+    noise = 500.0 * np.random.default_rng(0).standard_normal(TIME.size)
+    ramp = -20e3 * np.clip((TIME - 18.3) / 8.5, 0.0, 1.0)
+    found = slow(of_force(TIME, ramp + 30e3 + noise))
+    assert found.force == pytest.approx(-20e3, rel=0.1)
+    assert found.rise == 8.0  # of those that are tried
+    assert found.begin + 0.5 * found.rise == pytest.approx(18.3 + 0.5 * 8.5, abs=0.5)
 
 
 def moved(load: Array) -> Array:

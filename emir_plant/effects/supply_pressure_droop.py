@@ -18,9 +18,10 @@ class SupplyPressureDroop(Effect):
         "pump controller and line: some 10 bar at 200 l/min, recovering in 0.1-0.5 s"
     )
     trial: ClassVar[dict[str, float]] = {"resistance": 1e9}
+    stepwise: ClassVar[tuple[str, ...]] = ("resistance",)  # only where the pressure is short
 
     resistance: float = quantity("Pa s/m^3", 0.0, 1e13, "R", default=0.0)
-    time_constant: float = quantity("s", 5e-3, 10.0, "T", default=0.2)
+    time_constant: float = quantity("s", 1e-3, 10.0, "T", default=0.2)
 
 
 @compiled

@@ -28,6 +28,7 @@ ACCURACY = 1e-2  # relative; what is promising is fitted again with all paramete
 STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
 # the same of a size that acts only beyond some value
 STEPS = tuple(float(s) for s in range(-24, 25) if s)
+FINER = tuple(s / 5.0 for s in range(-4, 5))  # steps about the best of these
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
@@ -96,14 +97,30 @@ class _Candidate:
         self._start, self._known, self._left = start, known, left
         self.effect = start.effects[-1]
         low, high = (bound[known:] for bound in start.unknowns.bounds)
-        points = np.clip(starts, low, high)
-        residuals = self._inside(points)
-        best = int(np.argmin([_soft(row) for row in residuals]))
-        self.bounds, self.x, self.at_best = (low, high), points[best], residuals[best]
+        self.bounds = (low, high)
+        self.x, self.at_best = self._best(starts)
+        for unit in self._steps():
+            self.x, self.at_best = self._best([self.x + s * unit for s in FINER])
         steps = np.where(self.x + left.step_size > high, -left.step_size, left.step_size)
         self.slopes = (self._inside(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
         change, self.expected = _least(self.at_best, self.slopes, low - self.x, high - self.x)
         self._reached = self.x + change
+
+    def _best(self, starts: list[Array]) -> tuple[Array, Array]:
+        """Return the best of some fields, (k,), inside their bounds, and what is left there."""
+        points = np.clip(starts, *self.bounds)
+        residuals = self._inside(points)
+        best = int(np.argmin([_soft(row) for row in residuals]))
+        return points[best], residuals[best]
+
+    def _steps(self) -> list[Array]:
+        """Return a step, (k,), of each field that is begun in steps."""
+        members = self._start.unknowns.members[self._known :]
+        found = []
+        for k, name in enumerate(u.path.split(".") for u in members):
+            if name[2] in REGISTRY[name[1]].stepwise:
+                found.append(np.eye(len(members))[k] * members[k].start)
+        return found
 
     def fitted(self) -> Screened:
         """Fit the effects' fields, from where they are best or from where they ought to be."""

@@ -12,18 +12,27 @@ from emir_plant.jit import compiled
 class ValveDeadZoneError(Effect):
     """Overlap of the metering edges: dead zone + error, never below 0.
 
-    Fully open is at full stroke as before.
+    With rescaled = 1 full stroke opens fully as before, with 0 the opening grows with the stroke
+    as before, as it does where ports of the same width begin elsewhere.
     """
 
     balance: ClassVar[Balance] = "valve"
     sizes: ClassVar[tuple[str, ...]] = ("error",)
     source: ClassVar[str] = "overlap tolerance and wear, 1-3 % of the stroke"
-    trial: ClassVar[dict[str, float]] = {"error": 0.02}
+    trial: ClassVar[dict[str, float]] = {"error": 0.02, "rescaled": 0.5}
 
     error: float = quantity("1", -0.5, 0.4, "of the dead zone, share of full stroke", default=0.0)
+    rescaled: float = quantity("1", 0.0, 1.0, "1: full stroke opens fully", default=1.0)
 
 
 @compiled
 def dead_zone(p: Any) -> float:
     """Return the dead zone as it is, as a share of full stroke."""
     return max(p.dead_zone + p.valve_dead_zone_error_error, 0.0)
+
+
+@compiled
+def travel(p: Any) -> float:
+    """Return the travel over which the edges open fully, as a share of full stroke."""
+    error = dead_zone(p) - p.dead_zone
+    return 1.0 - p.dead_zone - p.valve_dead_zone_error_rescaled * error

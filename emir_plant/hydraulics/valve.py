@@ -17,9 +17,8 @@ def spool_acceleration(command: float, spool: float, spool_rate: float, p: Any) 
 def opening(spool: float, p: Any) -> float:
     """Return the signed opening o of the metering edges; 0 inside the dead zone, 1 fully open."""
     edges = valve_null_offset.shifted(spool, p)
-    dead_zone = valve_dead_zone_error.dead_zone(p)
-    beyond = abs(edges) - dead_zone
+    beyond = abs(edges) - valve_dead_zone_error.dead_zone(p)
     if beyond <= 0.0:
         return 0.0
-    share = beyond / (1.0 - dead_zone)
+    share = beyond / valve_dead_zone_error.travel(p)
     return share if edges > 0.0 else -share

@@ -461,6 +461,9 @@ def test_null_offset_and_dead_zone_move_where_the_valve_opens() -> None:
     assert valve.opening(0.15, wide) == pytest.approx(0.0, abs=1e-12)
     assert valve.opening(0.16, wide) == -valve.opening(-0.16, wide) > 0.0
     assert valve.opening(1.0, wide) == 1.0
+    same = _with(valve_dead_zone_error={"error": 0.05, "rescaled": 0.0}).record[0]
+    grown = valve.opening(0.5, same) - valve.opening(0.3, same)
+    assert grown == pytest.approx(0.2 / 0.9)  # as stated
     none = _with(valve_dead_zone_error={"error": -0.5}).record[0]
     assert valve.opening(0.01, none) == pytest.approx(0.01)
 

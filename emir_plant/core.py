@@ -36,7 +36,8 @@ DROOP = 6  # Pa, of the supply pressure
 EDGES = 7  # 1, where the play of the spool has left the metering edges
 OFFSET = 8  # m, of the piston against the joint
 LATE_ANGLE, LATE_P_H, LATE_P_S, LATE_DEFLECTION = 9, 10, 11, 12  # states of sensors that lag
-DELAY_LINE = 13  # of the command, see command_delay.py
+PLAYED = 13  # 1, the command behind the valve's play
+DELAY_LINE = 14  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
@@ -114,7 +115,7 @@ def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
 def derivative(x: Array, command: float, parameters: NDArray[Any]) -> Array:
     """Return dx/dt of the integrated model (paper Fig. 6) with a command at the valve.
 
-    That is the command y2 behind the delay line, on which only time and `_advance` work.
+    That is the command y2 behind delay line and play, on which `_advance` alone works.
     """
     dx = np.zeros_like(x)
     write_derivative(x, command, parameters, dx)
@@ -160,7 +161,7 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     dx[LOGIC] = logic_block.opening_rate(x[LOGIC], pilot, p)
     dx[TIME] = 1.0
     dx[DROOP] = supply_pressure_droop.rate(x[DROOP], pumped, p)
-    dx[EDGES] = 0.0  # `remember` moves them
+    dx[EDGES] = dx[PLAYED] = 0.0  # `remember` and `_advance` move them
     dx[OFFSET] = motion.offset_rate
     _write_lags(x, motion, p, dx)
     _write_boom(x, motion, dry, p, dx)
@@ -246,9 +247,10 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
+        x[PLAYED] = valve_hysteresis.played(arriving, x[PLAYED], p)
         left = h
         while left > 0.0:
-            left -= _step(x, arriving, left, h, p, work)
+            left -= _step(x, x[PLAYED], left, h, p, work)
 
 
 @compiled_in_place

@@ -19,7 +19,13 @@ from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
 from emir_plant import core
-from emir_plant.effects import command_delay, linkage_error, terms, vessel_compliance
+from emir_plant.effects import (
+    command_delay,
+    linkage_error,
+    terms,
+    valve_hysteresis,
+    vessel_compliance,
+)
 from emir_plant.hydraulics import chambers
 from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
 
@@ -120,7 +126,9 @@ def _follow(  # noqa: PLR0913, PLR0917 (as _step)
                 at[0, i] = measured[k, i] + slope * j
                 at[1, i] = at[0, i] + 0.5 * slope
                 at[2, i] = at[0, i] + slope
-            _step(x, arriving[k * every + j], dt, at, p, work)
+            command = arriving[k * every + j]
+            x[core.PLAYED] = valve_hysteresis.played(command, x[core.PLAYED], p)
+            _step(x, x[core.PLAYED], dt, at, p, work)
             left_out = (measured[k + 1, 4] - measured[k, 4]) / every - dt * at[1, 3]
             swept_lifting, swept_lowering = _swept(left_out, at[1], p)
             lifting += swept_lifting

@@ -507,10 +507,12 @@ def test_hysteresis_is_a_play_behind_an_overshooting_spool() -> None:
     assert abs(found[-1]) > 10.0 * error[-1]  # where the last command was 0
 
 
-def test_hysteresis_gives_two_speeds_for_one_command() -> None:
+@pytest.mark.parametrize("command_share", [0.0, 0.4, 1.0])
+def test_hysteresis_gives_two_speeds_for_one_command(command_share: float) -> None:
     """Reached from below, the opening is less by the width than from above."""
     width = 0.04
     values = {"effects.valve_hysteresis.width": width, "valve.damping": 1.0}  # no overshoot
+    values["effects.valve_hysteresis.command_share"] = command_share
     plant = Plant(with_values(joint1(), values))
 
     def flow(commands: tuple[float, ...]) -> float:
@@ -522,6 +524,20 @@ def test_hysteresis_gives_two_speeds_for_one_command() -> None:
     full = MACHINE.valve.flow_nominal
     difference = flow((0.8, 0.5)) - flow((0.2, 0.5))
     assert difference == pytest.approx(full * width / 0.9, rel=0.02)
+
+
+def test_hysteresis_of_the_magnet_is_a_play_of_the_command() -> None:
+    """Against the same machine without it, under the command with the play by hand."""
+    width = 0.04
+    plant = _with(valve_hysteresis={"width": width, "command_share": 1.0})
+    start = plant.initial(FORTY_FIVE, 20e5)
+    commands = np.repeat([0.6, 0.59, 0.2, 0.25, -0.5, -0.48, 0.0], 40)
+    played, memory = [], 0.0
+    for command in commands:
+        memory = min(max(memory, command - 0.5 * width), command + 0.5 * width)
+        played.append(memory)
+    expected = PLAIN.simulate(start, np.array(played), core.STEP)
+    assert np.array_equal(plant.simulate(start, commands, core.STEP), expected)
 
 
 @pytest.mark.parametrize("delay", [0.0004, 0.02, 0.0313, 0.15])

@@ -32,16 +32,21 @@ def residuals(machine: Machine, friction: recorded.Force | None) -> tuple[Balanc
 def distorted(machine: Machine, wrong: Machine) -> Balances:
     """Return the balances of a run of the machine, read by the sensors of the wrong one.
 
-    A bias, a gain and a lag written a second time, the lag by its step response.
+    A bias, a gain and a delay written a second time: dead time by shifting, a lag by its step
+    response.
     """
     effects = wrong.effects
     commands = recorded.moves(16.0, seed=5)
     truth = recorded.simulate(machine, commands)
-    decay = np.exp(-recorded.SAMPLE_PERIOD / effects.sensor_delay.deflection)
     bent = truth[:, 3] - truth[:, 2]
     late = [bent[0]]
-    for now, before in zip(bent[1:], bent[:-1], strict=True):
-        late.append(decay * late[-1] + (1.0 - decay) * 0.5 * (now + before))
+    if effects.sensor_delay.dead_share == 1.0:
+        samples = round(effects.sensor_delay.deflection / recorded.SAMPLE_PERIOD)
+        late = [*([bent[0]] * samples), *bent[:-samples]]
+    else:
+        decay = np.exp(-recorded.SAMPLE_PERIOD / effects.sensor_delay.deflection)
+        for now, before in zip(bent[1:], bent[:-1], strict=True):
+            late.append(decay * late[-1] + (1.0 - decay) * 0.5 * (now + before))
     truth[:, 3] = truth[:, 2] + late
     truth[:, 0] += effects.sensor_bias.pressure_lifting
     truth[:, 1] *= 1.0 + effects.sensor_gain.pressure_lowering
@@ -120,7 +125,10 @@ def test_friction_shows_in_the_force_balance_and_leaves_the_chambers_quiet(
     assert rms(missing)["lowering_chamber"] < 1.5 * rms(quiet)["lowering_chamber"]
 
 
-def test_a_sensor_that_is_known_to_distort_leaves_the_balances_quiet(machine: Machine) -> None:
+@pytest.mark.parametrize("dead_share", [0.0, 1.0])
+def test_a_sensor_that_is_known_to_distort_leaves_the_balances_quiet(
+    machine: Machine, dead_share: float
+) -> None:
     balances, _ = residuals(machine, None)
     wrong = with_values(
         machine,
@@ -128,6 +136,7 @@ def test_a_sensor_that_is_known_to_distort_leaves_the_balances_quiet(machine: Ma
             "effects.sensor_bias.pressure_lifting": 3e5,
             "effects.sensor_gain.pressure_lowering": 0.05,
             "effects.sensor_delay.deflection": 0.02,
+            "effects.sensor_delay.dead_share": dead_share,
         },
     )
     seen, unseen = distorted(machine, wrong).residuals([wrong, machine])

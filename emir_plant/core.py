@@ -35,9 +35,9 @@ TIME = 5  # s, since the start of the run
 DROOP = 6  # Pa, of the supply pressure
 EDGES = 7  # 1, where the play of the spool has left the metering edges
 OFFSET = 8  # m, of the piston against the joint
-LATE_ANGLE, LATE_P_H, LATE_P_S, LATE_DEFLECTION = 9, 10, 11, 12  # states of sensors that lag
-PLAYED = 13  # 1, the command behind the valve's play
-DELAY_LINE = 14  # of the command, see command_delay.py
+LATE_ANGLE, LATE_P_H, LATE_P_S, LATE_DEFLECTION, LATE_STROKE = 9, 10, 11, 12, 13  # of sensors
+PLAYED = 14  # 1, the command behind the valve's play
+DELAY_LINE = 15  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
@@ -174,6 +174,7 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
     dx[LATE_ANGLE] = rate(motion.angle, x[LATE_ANGLE], p.sensor_delay_angle, dead)
     dx[LATE_P_H] = rate(x[P_H], x[LATE_P_H], p.sensor_delay_pressure_lifting, dead)
     dx[LATE_P_S] = rate(x[P_S], x[LATE_P_S], p.sensor_delay_pressure_lowering, dead)
+    dx[LATE_STROKE] = rate(motion.stroke, x[LATE_STROKE], p.sensor_delay_stroke, dead)
     dx[LATE_DEFLECTION] = rate(bending, x[LATE_DEFLECTION], p.sensor_delay_deflection, dead)
 
 

@@ -106,6 +106,7 @@ class Sensors:
     resolver_span: float = quantity("rad", 0.1, 6.2832, "angle of the full count")
     pressure_noise: float = quantity("Pa", 0.0, 1e6, "standard deviation")
     deflection_noise: float = quantity("rad", 0.0, 1e-2, "standard deviation")
+    own_stroke: int = quantity("1", 0, 1, "stroke: 0 by the angle, 1 measured", default=0)
     seed: int = quantity("1", 0, 2**31 - 1, "of the noise", default=0)
 
     @property

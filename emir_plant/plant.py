@@ -78,6 +78,7 @@ class Plant:
         position[1:] = bent[1:] / p["mode_stiffness"][1:]
         position[0] = (angle - p["mode_joint"][1:] @ position[1:]) / p["mode_joint"][0]
         x[core.LATE_ANGLE], x[core.LATE_P_H], x[core.LATE_P_S] = angle, high, low
+        x[core.LATE_STROKE] = linkage_error.stroke(angle, p) + x[core.OFFSET]
         x[core.LATE_DEFLECTION] = p["mode_tip_angle"] @ position - angle
         return x
 

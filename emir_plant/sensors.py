@@ -1,7 +1,7 @@
 """The sensors of the paper: 12-bit joint resolver, pressure transducers, strain gauge.
 
-The stroke is computed from the resolver by the stated linkage, whatever the linkage is as built;
-the force from the measured pressures.
+The stroke is computed from the resolver by the stated linkage, whatever the linkage is as built,
+unless it has a sensor of its own; the force is computed from the measured pressures.
 """
 
 import math
@@ -25,7 +25,7 @@ class Measurement(NamedTuple):
     """One reading of all sensors; SI units."""
 
     angle: float  # resolver, rad
-    stroke: float  # computed from the resolver, m
+    stroke: float  # computed from the resolver or measured, m
     pressure_lifting: float  # Pa, absolute
     pressure_lowering: float  # Pa, absolute
     force: float  # p_H A_H - p_S A_S of the measured pressures, N (9)
@@ -52,6 +52,7 @@ _LATE = {
     "pressure_lifting": core.LATE_P_H,
     "pressure_lowering": core.LATE_P_S,
     "deflection": core.LATE_DEFLECTION,
+    "stroke": core.LATE_STROKE,
 }
 
 
@@ -76,6 +77,7 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
         "pressure_lifting": truth.pressure_lifting,
         "pressure_lowering": truth.pressure_lowering,
         "deflection": truth.tip_angle - truth.angle,
+        "stroke": truth.stroke,
     }
     late = machine.effects.sensor_delay
     for name, index in _LATE.items():
@@ -89,7 +91,7 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
     lowering = shown["pressure_lowering"] + sensors.pressure_noise * noise[1]
     return Measurement(
         angle=angle,
-        stroke=_stroke(angle, plant.record),
+        stroke=shown["stroke"] if sensors.own_stroke else _stroke(angle, plant.record),
         pressure_lifting=lifting,
         pressure_lowering=lowering,
         force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
@@ -110,14 +112,16 @@ def readings(plant: Plant, truth: Array, period: float) -> Readings:
         "pressure_lifting": columns.pressure_lifting,
         "pressure_lowering": columns.pressure_lowering,
         "deflection": columns.tip_angle - columns.angle,
+        "stroke": columns.stroke,
     }
     shown = {
         name: _distorted(_late(signal, name, period, machine), name, machine)
         for name, signal in true.items()
     }
     lifting, lowering = shown["pressure_lifting"], shown["pressure_lowering"]
+    if not machine.sensors.own_stroke:
+        shown["stroke"] = linkage.strokes(shown["angle"], plant.record[0])
     return Readings(
-        stroke=linkage.strokes(shown["angle"], plant.record[0]),
         force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
         **shown,
     )

@@ -140,7 +140,8 @@ class Balances:
         result = np.full((len(plants), self.time.size, len(BALANCES)), np.nan)
         for k, modelled in self._modelled(plants, true):
             stroke = self._stroke(plants[k], true[k])
-            result[k] = self._missing(modelled, true[k], stroke)
+            off = self._true_stroke(plants[k].machine) - stroke
+            result[k] = self._missing(modelled, true[k], off)
         return result
 
     def one_step(self, machine: Machine) -> Array:
@@ -220,14 +221,29 @@ class Balances:
     def _stroke(self, plant: Plant, true: Array) -> Array:
         """Return the stroke that the machine has at the angle, (n,) m, as it is shown."""
         experiment = self._experiment
-        if not experiment.own_stroke:
+        if not plant.machine.sensors.own_stroke:
             return self._stated_stroke
         force = np.zeros(len(true))
         if {H, S} <= experiment.measured:
             force = true[:, 1] * self._areas[0] - true[:, 2] * self._areas[1]
         return np.asarray(terms.strokes(np.ascontiguousarray(true[:, 0]), force, plant.record[0]))
 
-    def _missing(self, modelled: Modelled, true: Array, stroke: Array) -> Array:
+    def _true_stroke(self, machine: Machine) -> Array:
+        """Return the stroke as shown, (n,) m, or as it truly was if its sensor distorts it."""
+        shown = self._experiment.outputs[:, 0]
+        if not machine.sensors.own_stroke:
+            return shown
+        effects = machine.effects
+        late = effects.sensor_delay
+        dead = late.dead_share * late.stroke
+        if late.stroke > dead:
+            slope = _smoothed(shown, LAG_SMOOTHING, self._experiment.period)[1]
+            shown = shown + (late.stroke - dead) * slope
+        undelayed = self._ahead(shown, dead)
+        return (undelayed - effects.sensor_bias.stroke) / (1.0 + effects.sensor_gain.stroke)
+
+    def _missing(self, modelled: Modelled, true: Array, off: Array) -> Array:
+        """Return what is missing in each balance; off: stroke beyond the machine's, (n,) m."""
         period = self._experiment.period
         angle, lifting, lowering, deflection = true[:, :4].T
         lifting = lifting - modelled.pressure_lifting
@@ -239,7 +255,7 @@ class Balances:
                 self._turn(turning) * self._mean(self._force_per_turning),
                 self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]) * self._filled[0],
                 self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]) * self._filled[1],
-                self._mean(self._experiment.outputs[:, 0] - stroke),
+                self._mean(off),
                 self._mean(deflection - modelled.deflection),
             ]
         )
@@ -331,6 +347,6 @@ def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0
     )
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
-    stroke = ideal[:, STROKE_COLUMN] if experiment.own_stroke else linkage.strokes(angle, p)
+    stroke = ideal[:, STROKE_COLUMN] if sensors.own_stroke else linkage.strokes(angle, p)
     shown = np.column_stack([stroke, ideal[:, 2:] + noise * scale])
     return experiment.showing(angle, shown)

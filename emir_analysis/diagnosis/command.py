@@ -65,7 +65,7 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     control = None
     if model_out is not None:
         progress("designing a controller before and after")
-        control = before_and_after(sheet.machine, findings.chosen.machine)
+        control = before_and_after(findings.sheet.machine, findings.chosen.machine)
     result = diagnosis(findings, judgement, control)
     if json is not None:
         write_json(json, result)

@@ -1,7 +1,7 @@
 """The course of a diagnosis: balances, parameters, effects, verdict - from recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, fit_balances
@@ -12,6 +12,7 @@ from emir_analysis.diagnosis.search import Progress, Search, Tried
 from emir_analysis.diagnosis.select import limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
 
 
@@ -44,6 +45,9 @@ class Findings:
 
 def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
     """Find out from recordings of one machine what its data sheet lacks."""
+    if all(e.own_stroke for e in experiments):
+        known = {"sensors.own_stroke": 1}
+        sheet = replace(sheet, machine=with_values(sheet.machine, known))
     evidence = Evidence(experiments, sheet.machine)
     search = Search(evidence, sheet, progress)
     best = search.run()

@@ -40,8 +40,7 @@ class Evidence:
         self.told = available(self.measured)
         parameters = np.arange(self.told.size) != LINKAGE
         self.complete = bool(np.all(self.told[parameters]))
-        own_stroke = all(e.own_stroke for e in self.experiments)
-        self.fitted = self.told & (parameters | own_stroke)
+        self.fitted = self.told & (parameters | bool(stated.sensors.own_stroke))
 
     @cached_property
     def _balances(self) -> list[Balances]:

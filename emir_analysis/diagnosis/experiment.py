@@ -190,7 +190,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
     apart = float(np.sqrt(np.mean((shown[STROKE] - _strokes(angle, machine)) ** 2)))
-    own_stroke = {ANGLE, STROKE} <= measured and apart > OWN_STROKE * noise(machine)[0]
+    measured_stroke = machine.sensors.own_stroke == 1 or apart > OWN_STROKE * noise(machine)[0]
+    own_stroke = {ANGLE, STROKE} <= measured and measured_stroke
     return Experiment(name, period, commands, angle, outputs, rest, measured, own_stroke)
 
 

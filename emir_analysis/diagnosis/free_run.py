@@ -7,7 +7,6 @@ import numpy as np
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, SUBSTEP, Experiment
 from emir_analysis.signals import Array
 from emir_plant import lanes
-from emir_plant.core import Truth
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import readings, undistorted
@@ -50,8 +49,6 @@ def free_runs(
     for k, truth in zip(able, truths, strict=True):
         shown = readings(plants[k], truth, experiment.period)
         result[k] = np.column_stack([getattr(shown, name) for name in SHOWN])
-        if experiment.own_stroke:
-            result[k][:, STROKE] = truth[:, Truth._fields.index("stroke")]
     return result
 
 

@@ -17,6 +17,7 @@ from emir_plant.sheet import Sheet
 
 WIDE = 20.0  # an effect's parameter whose range spans more than this factor is fitted as its log
 END = 1e-3  # of its scale, within which a parameter stands at the end of what is allowed
+STROKE = "stroke"  # field of what a sensor does to it
 ROUNDING = 1e-9  # relative, by which x stays inside its bounds, so that its value does, too
 
 
@@ -103,7 +104,10 @@ class Unknowns:
 
 
 def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
-    """Return the sheet's toleranced parameters and all parameters of the named effects."""
+    """Return the sheet's toleranced parameters and all parameters of the named effects.
+
+    Without those of a stroke sensor that the machine does not have.
+    """
     stated = groups(sheet.machine)
     members = [_toleranced(stated, path, tol) for path, tol in sheet.tolerances.items()]
     for effect in effects:
@@ -128,6 +132,8 @@ def _of_effect(effect: str, machine: Machine) -> list[Unknown]:
     stated = kind()
     members = []
     for name, about in quantities(kind).items():
+        if name == STROKE and not machine.sensors.own_stroke:
+            continue
         value = float(kind.trial.get(name, getattr(stated, name)))
         if name in kind.sizes:
             value = min(value * proportion(about.unit, machine), about.high)

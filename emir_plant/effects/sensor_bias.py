@@ -17,6 +17,7 @@ class SensorBias(Effect):
         "pressure_lifting",
         "pressure_lowering",
         "deflection",
+        "stroke",
     )
     source: ClassVar[str] = (
         "zero of a 400 bar transducer 0.25 %; mounting of a resolver; zero of a bridge"
@@ -26,9 +27,11 @@ class SensorBias(Effect):
         "pressure_lifting": 1e5,
         "pressure_lowering": 1e5,
         "deflection": 2e-4,
+        "stroke": 2e-3,
     }
 
     angle: float = quantity("rad", -0.2, 0.2, "bias of the resolver", default=0.0)
     pressure_lifting: float = quantity("Pa", -5e6, 5e6, "bias of p_H", default=0.0)
     pressure_lowering: float = quantity("Pa", -5e6, 5e6, "bias of p_S", default=0.0)
     deflection: float = quantity("rad", -0.05, 0.05, "bias of the gauges", default=0.0)
+    stroke: float = quantity("m", -0.5, 0.5, "bias of a measured stroke", default=0.0)

@@ -26,6 +26,7 @@ class SensorDelay(Effect):
         "pressure_lifting",
         "pressure_lowering",
         "deflection",
+        "stroke",
     )
     source: ClassVar[str] = "filters of transducers and amplifiers, sampling and bus: 10-50 ms"
     trial: ClassVar[dict[str, float]] = {
@@ -33,6 +34,7 @@ class SensorDelay(Effect):
         "pressure_lifting": 0.02,
         "pressure_lowering": 0.02,
         "deflection": 0.02,
+        "stroke": 0.02,
         "dead_share": 0.5,
     }
 
@@ -40,6 +42,7 @@ class SensorDelay(Effect):
     pressure_lifting: float = quantity("s", 0.0, 1.0, "T of p_H", default=0.0)
     pressure_lowering: float = quantity("s", 0.0, 1.0, "T of p_S", default=0.0)
     deflection: float = quantity("s", 0.0, 1.0, "T of the gauges", default=0.0)
+    stroke: float = quantity("s", 0.0, 1.0, "T of a measured stroke", default=0.0)
     dead_share: float = quantity("1", 0.0, 1.0, "share of T that is dead time", default=0.0)
 
 

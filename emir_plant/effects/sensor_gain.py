@@ -17,6 +17,7 @@ class SensorGain(Effect):
         "pressure_lifting",
         "pressure_lowering",
         "deflection",
+        "stroke",
     )
     source: ClassVar[str] = "span of a pressure transducer 0.5 %, of strain gauges 2 %"
     trial: ClassVar[dict[str, float]] = {
@@ -24,9 +25,11 @@ class SensorGain(Effect):
         "pressure_lifting": 1e-2,
         "pressure_lowering": 1e-2,
         "deflection": 2e-2,
+        "stroke": 2e-2,
     }
 
     angle: float = quantity("1", -0.5, 0.5, "relative error of the resolver", default=0.0)
     pressure_lifting: float = quantity("1", -0.5, 0.5, "relative error of p_H", default=0.0)
     pressure_lowering: float = quantity("1", -0.5, 0.5, "relative error of p_S", default=0.0)
     deflection: float = quantity("1", -0.5, 0.5, "relative error of the gauges", default=0.0)
+    stroke: float = quantity("1", -0.5, 0.5, "relative error of a measured stroke", default=0.0)

@@ -1,7 +1,5 @@
 """A stroke that a sensor of its own shows, not the angle and the stated linkage."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import recorded
@@ -18,6 +16,7 @@ from emir_plant.sheet import Sheet, joint1
 
 ANGLE_STEP = joint1().sensors.resolver_step
 GAP = {"effects.backlash.gap": 2e-3}
+MEASURED = with_values(joint1(), {"sensors.own_stroke": 1})
 WRONG_LINKAGE = {
     "effects.linkage_error.scale": 0.01,
     "effects.linkage_error.slope": -0.03,
@@ -74,8 +73,8 @@ def test_a_linkage_and_a_play_that_are_known_leave_the_balance_quiet(
     force = truth[:, 0] * cylinder.area_lifting - truth[:, 1] * cylinder.area_lowering
     assert force.min() > 1e5  # far from where the piston leaves its flank
     balances = Balances(shown(built + 1e-3, truth), joint1())
-    right = with_values(joint1(), WRONG_LINKAGE | GAP)
-    others = [with_values(joint1(), part) for part in ({}, WRONG_LINKAGE, GAP)]
+    right = with_values(MEASURED, WRONG_LINKAGE | GAP)
+    others = [with_values(MEASURED, part) for part in ({}, WRONG_LINKAGE, GAP)]
     seen, *unseen = balances.residuals([right, *others])
     noise = ANGLE_STEP / np.sqrt(12.0) * 0.65  # the lever arm, m
     assert level(seen)[LINKAGE] < noise
@@ -87,12 +86,15 @@ def test_a_linkage_and_a_play_that_are_known_leave_the_balance_quiet(
     [
         ({"effects.linkage_error.scale": 0.015}, "linkage_error"),
         ({"effects.sensor_bias.angle": 8e-3}, "sensor_bias"),
+        ({"effects.sensor_bias.stroke": -8e-3}, "sensor_bias"),
+        ({"effects.sensor_gain.stroke": 0.02}, "sensor_gain"),
+        ({"effects.sensor_delay.stroke": 0.05}, "sensor_delay"),
     ],
 )
 def test_what_shows_between_stroke_and_angle_is_named(hidden: dict[str, float], name: str) -> None:
-    machine = with_values(joint1(), hidden)
-    own = replace(run(machine), own_stroke=True)
+    machine = with_values(MEASURED, hidden)
+    own = run(machine)
     ideal = free_runs([machine], own, [(0.8, 20e5)])[0]
-    evidence = Evidence([sensed(own, machine, ideal)], joint1())
-    found = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None).run()
+    evidence = Evidence([sensed(own, machine, ideal)], MEASURED)
+    found = Search(evidence, Sheet(MEASURED, TOLERANCES, {}, ()), lambda _: None).run()
     assert found[0].effects == (name,)

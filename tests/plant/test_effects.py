@@ -43,6 +43,7 @@ T = {name: k for k, name in enumerate(Truth._fields)}
 # when it is lifted, so that faults of both show.
 MACHINE = with_values(joint1(), {"logic_block.threshold": 100e5, "supply.p0": 130e5})
 PLAIN = Plant(MACHINE)
+OWN_STROKE = with_values(MACHINE, {"sensors.own_stroke": 1})  # has a sensor of its own
 
 
 def _switched_on(name: str, factor: float = 1.0) -> Machine:
@@ -106,7 +107,7 @@ def test_each_size_alone_reaches_what_the_sensors_show(
     kind = REGISTRY[name]
     values = {f"effects.{name}.{key}": v for key, v in kind.trial.items() if key not in kind.sizes}
     values[f"effects.{name}.{size}"] = kind.trial[size]
-    shown = _shown(with_values(MACHINE, values))
+    shown = _shown(with_values(OWN_STROKE if size == "stroke" else MACHINE, values))
     assert np.isfinite(shown).all()
     assert not np.allclose(shown, plain_run, rtol=1e-6, atol=0.0)
 
@@ -631,11 +632,12 @@ def test_fault_of_the_logic_block_changes_threshold_closing_and_pilot() -> None:
 @pytest.mark.parametrize("signal", REGISTRY["sensor_bias"].sizes)
 def test_gain_and_bias_touch_one_sensor_and_what_is_computed_from_it(signal: str) -> None:
     bias, gain = REGISTRY["sensor_bias"].trial[signal], 0.1
-    plant = _with(sensor_bias={signal: bias}, sensor_gain={signal: gain})
+    values = {f"effects.sensor_bias.{signal}": bias, f"effects.sensor_gain.{signal}": gain}
+    plant = Plant(with_values(OWN_STROKE if signal == "stroke" else MACHINE, values))
     run = PLAIN.simulate(_moving_state(), np.zeros(300), 1e-3, 10)
     true, shown = readings(PLAIN, run, 1e-2), readings(plant, run, 1e-2)
     assert getattr(shown, signal) == pytest.approx(1.1 * getattr(true, signal) + bias, rel=1e-12)
-    computed = {"angle": {"stroke"}, "deflection": set()}.get(signal, {"force"})
+    computed = {"angle": {"stroke"}, "deflection": set(), "stroke": set()}.get(signal, {"force"})
     for other in set(true._fields) - computed - {signal}:
         assert np.array_equal(getattr(shown, other), getattr(true, other))
     for other in computed:
@@ -679,6 +681,28 @@ def test_predicted_readings_are_those_measured_but_for_noise_and_quantisation(
     span = np.ptp(predicted, axis=0)
     error = np.sqrt(np.mean((predicted - np.array(shown)) ** 2, axis=0))
     assert (error < (0.02 if dead_share else 1e-3) * span).all()
+
+
+def test_a_stroke_of_its_own_is_the_pistons_and_late_alone() -> None:
+    """Play and linkage error show in it; a bias of the resolver does not."""
+    hidden = {
+        "effects.backlash.gap": 2e-3,
+        "effects.linkage_error.scale": 0.02,
+        "effects.sensor_bias.angle": 0.01,
+        "effects.sensor_delay.stroke": 0.1,
+    }
+    plant, dt = Plant(with_values(OWN_STROKE, hidden)), 1e-2
+    state = plant.initial(FORTY_FIVE, 20e5)
+    shown = [measure(plant, plant.outputs(state), 0, state).stroke]
+    true = [plant.outputs(state).stroke]
+    for k in range(300):
+        state, truth = plant.step(state, 0.4, dt)
+        shown.append(measure(plant, truth, k + 1, state).stroke)
+        true.append(truth.stroke)
+    assert shown[0] == true[0]
+    assert shown[-1] < true[-1]
+    late = np.interp(0.01 * np.arange(301) - 0.1, 0.01 * np.arange(301), true)
+    assert shown[-1] == pytest.approx(late[-1], abs=2e-4)  # a ramp by now
 
 
 def test_a_sensor_of_dead_time_shows_what_was() -> None:

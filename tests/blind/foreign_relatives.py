@@ -63,39 +63,6 @@ class TurbulentDrip(Hidden):
         return out_h + _through_a_hole(self.sizes["drip"], p_h - self.n.pT), out_s
 
 
-class LateSensor(Hidden):
-    """A sensor whose signal comes late as a whole, over a bus."""
-
-    name = "sensor_delay~pure"
-    grows = ("late_angle", "late_pressure_lifting", "late_deflection")
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {str(random.choice(cls.grows)): between(random, 0.015, 0.06)}
-
-    def shown(self, signals: dict[str, Array], states: Array) -> dict[str, Array]:
-        time = np.arange(states.shape[0]) / self.n.rate
-        return {
-            name: np.interp(time - self.size(f"late_{name}"), time, signal)
-            for name, signal in super().shown(signals, states).items()
-        }
-
-
-class LinearDrift(Hidden):
-    """A valve's gain that changes evenly with time."""
-
-    name = "flow_gain_drift~linear"
-    grows = ("per_minute",)
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"per_minute": either_sign(random, 0.06, 0.25)}
-
-    def opening(self, edges: float, time: float, stroke: float) -> float:
-        gain = 1.0 + self.sizes["per_minute"] * time / 60.0
-        return super().opening(edges, time, stroke) * gain
-
-
 class SmoothHysteresis(Hidden):
     """A spool that lags behind as Dahl's friction does: round the corner, not by play."""
 
@@ -145,25 +112,6 @@ class SquareDroop(Hidden):
 
     def start_memory(self, angle: float, x: list[float]) -> list[float]:
         return [*super().start_memory(angle, x), 0.0]
-
-
-class RampedLoad(Hidden):
-    """A load that comes slowly and stays."""
-
-    name = "external_load~ramp"
-    grows = ("pull",)
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {
-            "pull": either_sign(random, 500.0, 3000.0),
-            "comes_at": random.uniform(5.0, 25.0),
-            "comes_in": random.uniform(2.0, 15.0),
-        }
-
-    def tip_force(self, time: float) -> float:
-        share = min(max((time - self.sizes["comes_at"]) / self.sizes["comes_in"], 0.0), 1.0)
-        return super().tip_force(time) + self.sizes["pull"] * share
 
 
 class UnevenFriction(Hidden):
@@ -314,11 +262,8 @@ class MeasuredBias(Hidden):
 FOREIGN: tuple[type[Hidden], ...] = (
     TurbulentLeak,
     TurbulentDrip,
-    LateSensor,
-    LinearDrift,
     SmoothHysteresis,
     SquareDroop,
-    RampedLoad,
     UnevenFriction,
     AirInOneChamber,
     StiffeningHose,

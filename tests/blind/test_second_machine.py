@@ -146,21 +146,50 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
 }
 
 
+_OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text())
+_OTHER = {kind.name: kind for kind in _OTHERS}
+FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
+    _OTHER["sensor_delay~dead time"]: (
+        {"late_pressure_lifting": 0.037},
+        {"pressure_lifting": 0.037, "dead_share": 1.0},
+    ),
+    _OTHER["flow_gain_drift~linear"]: ({"per_minute": 0.6}, {"change": 0.6, "time_constant": 1e5}),
+    _OTHER["external_load~slow"]: (
+        {"pull": 1e3, "comes_at": 0.7, "comes_in": 0.8, "stays": 2.0},
+        {"force": 1e3, "start": 0.7, "rise": 0.8, "duration": 2.0},
+    ),
+    _OTHER["external_load~mean and swing"]: (
+        {"hangs": -500.0, "swings": 0.8, "swing_frequency": 0.4, "swing_phase": 1.2},
+        {"mean": -500.0, "force": -400.0, "frequency": 0.4, "phase": 1.2},
+    ),
+    _OTHER["vessel_compliance~beta"]: (
+        {"softer": -0.3, "where": 1.0},
+        {"lowering": -0.3 * STATED.volume_lowering_0 / STATED.beta, "wall_share": 1.0},
+    ),
+    _OTHER["valve_dead_zone_error~same slope"]: ({"moved": 0.03}, {"error": 0.03, "rescaled": 0.0}),
+    _OTHER["valve_hysteresis~on the command"]: (
+        {"magnet": 0.04},
+        {"width": 0.04, "command_share": 1.0},
+    ),
+}
+
+
 @pytest.fixture(scope="module")
 def healthy() -> dict[str, hidden.Array]:
     """The project's machine without effects."""
     return of_plant({}, moves(5.0))
 
 
-@pytest.mark.parametrize("kind", SAME, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", SAME | FORMS, ids=lambda kind: kind.name)
 def test_an_effect_written_twice_does_the_same(
     kind: type[hidden.Hidden], healthy: dict[str, hidden.Array]
 ) -> None:
     commands = moves(5.0)
-    here, there = SAME[kind]
+    here, there = (SAME | FORMS)[kind]
+    name = kind.name.split("~")[0]
     run = repeated(kind(STATED, here), START, commands)
     made = apart(run, healthy)
-    error = apart(run, of_plant({f"{kind.name}.{k}": v for k, v in there.items()}, commands))
+    error = apart(run, of_plant({f"{name}.{k}": v for k, v in there.items()}, commands))
     loudest = max(SIGNALS, key=lambda name: made[name] / SIGNALS[name])
     assert made[loudest] > 10.0 * SIGNALS[loudest]  # else nothing is compared
     # what is left is the other smoothing, or sampled against continuous
@@ -170,6 +199,7 @@ def test_an_effect_written_twice_does_the_same(
 def test_all_of_the_catalogue_is_compared() -> None:
     never_alone = {hidden.Backlash}  # under this load it never crosses
     assert set(hidden.CATALOGUE) == SAME.keys() | never_alone
+    assert set(_OTHERS) == FORMS.keys()
 
 
 def test_two_effects_act_together() -> None:
@@ -190,7 +220,9 @@ def test_any_two_effects_go_together_in_either_order() -> None:
         assert np.isfinite(machine.rates(x, 0.0, 0.0)).all(), (one.name, other.name)
 
 
-@pytest.mark.parametrize("file", ["foreign.py", "foreign_more.py", "foreign_relatives.py"])
+@pytest.mark.parametrize(
+    "file", ["foreign.py", "foreign_more.py", "foreign_relatives.py", "foreign_forms.py"]
+)
 def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
     source = (Path(__file__).parent / file).read_text()
     for effect in foreign_effects(source):

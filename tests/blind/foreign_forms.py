@@ -1,0 +1,164 @@
+"""Effects of the catalogue in other forms than `hidden.py` has, for `emir blind --foreign`.
+
+The registry knows these forms, so `found` with the name before the ~ is the right answer.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from emir_analysis.blind.hidden import Hidden, Random, between, either_sign
+from emir_analysis.blind.machine import Array, Sizes
+from emir_analysis.blind.numbers import Numbers
+
+
+class LateSensor(Hidden):
+    """A sensor whose signal comes late as a whole, over a bus."""
+
+    name = "sensor_delay~dead time"
+    grows = ("late_angle", "late_pressure_lifting", "late_deflection")
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {str(random.choice(cls.grows)): between(random, 0.015, 0.06)}
+
+    def shown(self, signals: dict[str, Array], states: Array) -> dict[str, Array]:
+        time = np.arange(states.shape[0]) / self.n.rate
+        return {
+            name: np.interp(time - self.size(f"late_{name}"), time, signal)
+            for name, signal in super().shown(signals, states).items()
+        }
+
+
+class LinearDrift(Hidden):
+    """A valve's gain that changes evenly with time."""
+
+    name = "flow_gain_drift~linear"
+    grows = ("per_minute",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"per_minute": either_sign(random, 0.06, 0.25)}
+
+    def opening(self, edges: float, time: float, stroke: float) -> float:
+        gain = 1.0 + self.sizes["per_minute"] * time / 60.0
+        return super().opening(edges, time, stroke) * gain
+
+
+class SlowLoad(Hidden):
+    """A load that comes slowly and stays, or goes as it came."""
+
+    name = "external_load~slow"
+    grows = ("pull",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "pull": either_sign(random, 500.0, 3000.0),
+            "comes_at": random.uniform(5.0, 25.0),
+            "comes_in": between(random, 0.3, 15.0),
+            "stays": float(random.choice([1e6, random.uniform(5.0, 15.0)])),
+        }
+
+    def tip_force(self, time: float) -> float:
+        since, rise = time - self.sizes["comes_at"], self.sizes["comes_in"]
+        come, gone = np.clip([since / rise, (since - self.sizes["stays"]) / rise], 0.0, 1.0)
+        return super().tip_force(time) + self.sizes["pull"] * float(come - gone)
+
+
+class SwingAboutMean(Hidden):
+    """A load that hangs and swings, from before the recording."""
+
+    name = "external_load~mean and swing"
+    grows = ("hangs",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "hangs": either_sign(random, 300.0, 1500.0),
+            "swings": random.uniform(0.3, 1.0),
+            "swing_frequency": between(random, 0.05, 0.4),
+            "swing_phase": random.uniform(-3.0, 3.0),
+        }
+
+    def tip_force(self, time: float) -> float:
+        s = self.sizes
+        angle = 2.0 * np.pi * s["swing_frequency"] * time + s["swing_phase"]
+        swing = s["hangs"] * (1.0 + s["swings"] * float(np.cos(angle)))
+        return super().tip_force(time) + swing
+
+
+class OtherOil(Hidden):
+    """Oil softer or stiffer than stated, beyond what the maker allows for, in one chamber or both.
+
+    One chamber: walls, then.
+    """
+
+    name = "vessel_compliance~beta"
+    grows = ("softer",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        softer = float(random.choice([random.uniform(0.35, 0.9), random.uniform(-0.35, -0.25)]))
+        return {"softer": softer, "where": float(random.integers(3))}
+
+    def stiffness(self, pressure: float, volume: float, *, lifting: bool) -> float:
+        oil = super().stiffness(pressure, volume, lifting=lifting)
+        both = self.sizes["where"] == 2.0
+        here = both or lifting == (self.sizes["where"] == 0.0)
+        return oil / (1.0 + self.sizes["softer"]) if here else oil
+
+
+class SameSlope(Hidden):
+    """Ports of the same width that begin elsewhere."""
+
+    name = "valve_dead_zone_error~same slope"
+    grows = ("moved",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"moved": either_sign(random, 0.012, 0.05)}
+
+    def changed(self, numbers: Numbers) -> Numbers:
+        n = super().changed(numbers)
+        return Numbers(**{**vars(n), "dead_zone": n.dead_zone + self.sizes["moved"]})
+
+    def opening(self, edges: float, time: float, stroke: float) -> float:
+        width = self.n.dead_zone
+        steeper = (1.0 - width) / (1.0 - width + self.sizes["moved"])
+        return super().opening(edges, time, stroke) * steeper
+
+
+class PlayOfMagnet(Hidden):
+    """Play between command and spool."""
+
+    name = "valve_hysteresis~on the command"
+    grows = ("magnet",)
+
+    def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
+        super().__init__(numbers, sizes)
+        self._acting = 0.0
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"magnet": between(random, 0.012, 0.05)}
+
+    def start(self, angle: float, p_s: float) -> Array:
+        self._acting = 0.0
+        return super().start(angle, p_s)
+
+    def run(self, x: Array, times: Array, command: float) -> Any:
+        half = 0.5 * self.sizes["magnet"]
+        self._acting = min(max(self._acting, command - half), command + half)
+        return super().run(x, times, self._acting)
+
+
+FOREIGN: tuple[type[Hidden], ...] = (
+    LateSensor,
+    LinearDrift,
+    SlowLoad,
+    SwingAboutMean,
+    OtherOil,
+    SameSlope,
+    PlayOfMagnet,
+)

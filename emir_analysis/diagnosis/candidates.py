@@ -18,6 +18,7 @@ from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
@@ -78,6 +79,12 @@ class Trial:
         """Return the trial with the other sizes of an effect at 0, no longer to be fitted."""
         return self._less([f"effects.{effect}.{s}" for s in REGISTRY[effect].sizes if s != size])
 
+    def fixed(self, path: str, value: float) -> "Trial":
+        """Return the trial with a parameter at a value, SI unit, no longer to be fitted."""
+        less = self._less([path])
+        machine = with_values(less.unknowns.machine, {path: value})
+        return replace(less, unknowns=replace(less.unknowns, machine=machine))
+
     def _less(self, paths: Sequence[str]) -> "Trial":
         kept = np.array([u.path not in paths for u in self.unknowns.members], dtype=bool)
         members = tuple(u for u, stays in zip(self.unknowns.members, kept, strict=True) if stays)
@@ -97,7 +104,7 @@ def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) ->
         x = members.start
     else:
         new = unknowns(replace(sheet, tolerances={}), effects[len(known.effects) :])
-        members = Unknowns(sheet.machine, (*known.unknowns.members, *new.members))
+        members = Unknowns(known.unknowns.machine, (*known.unknowns.members, *new.members))
         x = np.append(known.x, new.start)
     return Trial(effects, members, x, np.full((x.size, x.size), np.nan))
 
@@ -174,6 +181,7 @@ def _shapes(start: Trial, effect: str) -> Array:
     for k in shaping:
         x, u = float(start.x[k]), members[k]
         others = [x - SHAPE_STEP, x + SHAPE_STEP] if u.logarithmic else []
+        others += [u.low, u.high] if u.is_share else []
         others = [float(np.clip(v, u.low, u.high)) for v in others]
         levels.append(list(dict.fromkeys([x, u.start, *others])))
     points = []

@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.statistics import (
 from emir_analysis.diagnosis.telling import untold
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
+from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
 
 if TYPE_CHECKING:
@@ -215,18 +216,21 @@ def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, 
 
 
 def _effects(findings: Findings, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:
-    return tuple(
-        EffectResult(
-            name,
-            REGISTRY[name].balance,
-            {
-                path.rsplit(".", 1)[1]: parameter
-                for path, parameter in fitted.items()
-                if path.startswith(f"effects.{name}.")
-            },
-        )
-        for name in findings.chosen.effects
-    )
+    """Return the effects with their fitted parameters, and shapes that were fixed at the end."""
+    found = []
+    for name in findings.chosen.effects:
+        kind = REGISTRY[name]
+        effect = getattr(findings.chosen.machine.effects, name)
+        parameters = {}
+        for parameter, about in quantities(kind).items():
+            path = f"effects.{name}.{parameter}"
+            if path in fitted:
+                parameters[parameter] = fitted[path]
+            elif parameter not in kind.sizes:
+                value = float(getattr(effect, parameter))
+                parameters[parameter] = ParameterResult(value, about.unit, value, value, ())
+        found.append(EffectResult(name, kind.balance, parameters))
+    return tuple(found)
 
 
 def _candidates(findings: Findings) -> tuple[CandidateResult, ...]:

@@ -41,6 +41,7 @@ from emir_analysis.diagnosis.select import (
     rivals,
 )
 from emir_analysis.diagnosis.stick_slip import begun, grown, with_less_friction
+from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
@@ -148,7 +149,7 @@ class Search:
             if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
                 fitted = self._with_fewer_sizes(fitted)
                 fitted = fitted if sticks(fitted) else self._refined_again(fitted)
-            self._whole[chosen.effects] = fitted
+            self._whole[chosen.effects] = self._with_simple_shares(fitted)
         return self._whole[chosen.effects]
 
     def _refined_again(self, fitted: Trial) -> Trial:
@@ -174,6 +175,19 @@ class Search:
             if alone is not None:
                 best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
         return best
+
+    def _with_simple_shares(self, fitted: Trial) -> Trial:
+        """Return a trial whose shares are none or all of it where that is as good.
+
+        What the recordings do not tell, chance would decide; where both do, what is usual is taken.
+        """
+        for unknown in fitted.unknowns.members:
+            if unknown.is_share:
+                usual = round(declared(self._sheet.machine)[unknown.path][1])
+                ends = [fitted.fixed(unknown.path, float(end)) for end in (usual, 1 - usual)]
+                simpler = min(ends, key=self._on_whole)
+                fitted = min(simpler, fitted, key=self._on_whole)
+        return fitted
 
     def needed(self, chosen: Trial) -> Trial:
         """Return a trial without the effect that is least needed, if one is not."""

@@ -55,15 +55,20 @@ class Unknown:
         """Return the values at x - width and x + width, inside the bounds."""
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
 
+    @property
+    def is_share(self) -> bool:
+        """Tell whether it is a share, of which none and all are as likely as any other."""
+        low, high = self.value(self.low), self.value(self.high)
+        return self.unit == "1" and abs(low) < END and abs(high - 1.0) < END
+
     def at_end(self, x: float) -> bool:
         """Tell whether x was led to the end of what is allowed.
 
-        None at all, and all of a share, are no such end.
+        None at all is no such end, and neither end of a share is.
         """
         led = abs(x - self.start) > END
         least = x - self.low < END and abs(self.value(self.low)) > ROUNDING * abs(self.scale)
-        all_of_it = self.unit == "1" and math.isclose(self.value(self.high), 1.0)
-        return led and (least or (self.high - x < END and not all_of_it))
+        return led and not self.is_share and (least or self.high - x < END)
 
 
 @dataclass(frozen=True)

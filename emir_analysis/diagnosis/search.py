@@ -185,8 +185,8 @@ class Search:
             if unknown.is_share:
                 usual = round(declared(self._sheet.machine)[unknown.path][1])
                 ends = [fitted.fixed(unknown.path, float(end)) for end in (usual, 1 - usual)]
-                simpler = min(ends, key=self._on_whole)
-                fitted = min(simpler, fitted, key=self._on_whole)
+                score = self._on_whole(fitted)
+                fitted = next((end for end in ends if self._on_whole(end) <= score), fitted)
         return fitted
 
     def needed(self, chosen: Trial) -> Trial:

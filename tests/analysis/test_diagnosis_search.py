@@ -39,6 +39,7 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_plant.effects import vessel_compliance
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 from emir_plant.sheet import Sheet, joint1
@@ -289,6 +290,26 @@ def test_a_late_command_is_simpler_than_four_late_sensors(
     assert [each.effects for each in chosen] == [(named,)]
 
 
+@pytest.mark.parametrize(
+    ("missing", "share", "told"),
+    [
+        ({"pressure_lifting": 0.005, "dead_share": 0.6}, 0.0, False),
+        ({"pressure_lifting": 0.06}, 0.0, False),
+        ({"pressure_lifting": 0.06, "dead_share": 1.0}, 1.0, False),
+        ({"pressure_lifting": 0.3, "dead_share": 0.5}, 0.5, True),
+    ],
+)
+def test_a_share_is_none_or_all_where_the_recording_does_not_tell(
+    missing: dict[str, float], share: float, *, told: bool
+) -> None:
+    """As for a short delay, which shows one way or the other."""
+    values = {f"effects.sensor_delay.{name}": value for name, value in missing.items()}
+    found = fitted(search(values), "sensor_delay")
+    assert found.machine.effects.sensor_delay.dead_share == pytest.approx(share, abs=0.1)
+    members = [unknown.path for unknown in found.unknowns.members]
+    assert ("effects.sensor_delay.dead_share" in members) == told
+
+
 def test_a_healthy_machine_keeps_no_effect() -> None:
     begun = search({})
     assert begun[0].needed(fitted(begun, "viscous_friction")).effects == ()
@@ -309,5 +330,8 @@ def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_
     found = searched.run()
     assert [t.effects for t in found] == [("vessel_compliance", "valve_gain_asymmetry")]
     hoses = next(t.trial for t in searched.tried if t.trial.effects == ("vessel_compliance",))
-    lowering = hoses.machine.effects.vessel_compliance.lowering
+    cylinder = joint1().cylinder
+    stroke = float(np.mean(long.outputs[:, 0]))
+    volume = cylinder.volume_lowering_0 - cylinder.area_lowering * stroke
+    lowering = vessel_compliance.lowering(volume, Plant(hoses.machine).record[0])
     assert lowering == pytest.approx(9.3e-11, rel=0.06)

@@ -73,7 +73,7 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     """Minimise the squared residuals of a problem inside its bounds.
 
     accuracy: relative, of the cost. robust: residuals far above the noise count by their
-    size, not by its square.
+    size, not by its square. A start that cannot be simulated is returned with an infinite misfit.
     """
     low, high = problem.low, problem.high
     margin = 1e-6 * np.minimum(high - low, 1.0)
@@ -86,6 +86,9 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     def jacobian(change: Array) -> Array:
         return held.slopes(start + change)[1]
 
+    if not np.all(np.isfinite(residuals(np.zeros_like(start)))):
+        untold = np.full((start.size, start.size), np.inf)
+        return Solution(start, untold, math.inf, np.zeros_like(untold))
     # As a change from the start, since the trust region is at first as large as what it is given,
     # or one for zero: where a fit begins is no measure of how far a first step may lead.
     result = least_squares(

@@ -17,7 +17,7 @@ FREQUENCIES = 4  # that are tried in a bandwidth of 1 / duration
 FEWEST = 8  # windows over which a load has to swing
 SHORTEST = 4  # windows over which a load has to last
 RISES = (2.0, 4.0, 8.0, 16.0, 32.0)  # s, over which a load that stays may come
-FOR_EVER = 1e6  # s
+FOR_EVER = 1e5  # s
 WEAK = 1e-9  # relative to what the strongest window's load changes: less is as good as nothing
 
 

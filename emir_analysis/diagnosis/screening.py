@@ -81,6 +81,10 @@ class _Left:
             changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
         return residuals + changes @ self._triangle.T @ self._basis.T, self._x + changes
 
+    def runs(self, one: Trial) -> bool:
+        """Tell whether a trial's machine can rest where the recordings begin, and be simulated."""
+        return bool(np.all(np.isfinite(self._missing([one]))))
+
     def _augmented(self, trials: list[Trial]) -> Array:
         drawn = np.tile(self._drawn, (len(trials), 1))
         return np.column_stack([self._missing(trials), drawn])
@@ -153,9 +157,14 @@ class _Candidate:
         return np.array([False] * self._known + sizes)
 
     def _with_parameters(self, own: Array) -> Trial:
-        """Return the trial with fields, (k,), and the known parameters where they do their best."""
-        known = self._left.inside(self._trials(own[None]))[1][0]
-        return self._start.at(np.append(known, own))
+        """Return the trial with fields, (k,), and the known parameters where they do their best.
+
+        That is by straight lines, which may lead far: to no machine that runs, they stay.
+        """
+        as_they_are = self._trials(own[None])
+        known = self._left.inside(as_they_are)[1][0]
+        best = self._start.at(np.append(known, own))
+        return best if self._left.runs(best) else as_they_are[0]
 
     def _inside(self, points: Array) -> Array:
         return self._left.inside(self._trials(points))[0]
@@ -224,8 +233,11 @@ def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
     geometry = evidence.stated.geometry
     at_tip = geometry.triangle_b / geometry.boom_length  # order of magnitude of the lever ratio
     force = at_tip * np.nan_to_num(force)
-    always = constant(float(np.mean(force)), BEFORE, FOR_EVER)
-    return [always, *likely(of_force(evidence.time[: force.size], force))]
+    mean = float(np.mean(force))
+    found = likely(of_force(evidence.time[: force.size], force))
+    # by the force a constant is not told from parameters: a swing may have it for its mean
+    about_mean = [load._replace(mean=load.mean + mean) for load in found if load.frequency > 0.0]
+    return [constant(mean, BEFORE, FOR_EVER), *found, *about_mean]
 
 
 def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) -> list[Load]:

@@ -37,6 +37,8 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     if not np.any(evidence.fitted):
         return 0.0
     missing = (evidence.residuals([trial.machine])[0] / floor)[:, evidence.fitted]
+    if not np.all(np.isfinite(missing)):
+        return float("inf")
     independent = (evidence.duration(1.0) - len(evidence.experiments) * FORCE_WINDOW) / BLOCK
     # as the fit counts them: far above the noise by their size, so that no window decides alone
     misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))

@@ -23,6 +23,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.screening import screen
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
     SEEN,
@@ -213,6 +214,21 @@ def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> N
     loaded = loaded.at(np.append(plain.x, [u.at(pulse[u.path]) for u in further]))
     scores = [balance_score(t, evidence, searched.floor) for t in (loaded, plain)]
     assert scores[0] < scores[1] - STRONG
+
+
+def test_a_load_that_swings_about_a_mean_from_before_the_start_is_begun_so() -> None:
+    """Begun as a swing without one, the constant load seems to explain more."""
+    sizes = {"mean": -600.0, "force": 300.0, "frequency": 0.175, "phase": -1.33, "start": -1.0}
+    searched, sheet, evidence = search(
+        {f"effects.external_load.{name}": value for name, value in sizes.items()}
+    )
+    plain = fit_balances(trial(sheet, ()), evidence, searched.floor)
+    best = screen(plain, sheet, evidence, searched.floor)[0].trial
+    assert best.effects == ("external_load",)
+    load = best.machine.effects.external_load
+    assert load.mean == pytest.approx(-600.0, rel=0.02)
+    assert abs(load.force) == pytest.approx(300.0, rel=0.02)
+    assert load.frequency == pytest.approx(0.175, rel=0.02)
 
 
 def test_of_a_short_recording_a_balance_may_hold_more() -> None:

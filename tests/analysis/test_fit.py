@@ -78,7 +78,8 @@ def test_vectors_drawn_from_a_fit_have_its_spread() -> None:
     assert scaled.std(axis=0) == pytest.approx(1.0, rel=0.03)
 
 
-def test_a_descent_from_where_nothing_can_be_simulated_says_so() -> None:
+@pytest.mark.parametrize("method", [fit, descended])
+def test_a_fit_from_where_nothing_can_be_simulated_says_so(method: Method) -> None:
     """Its misfit is infinite; others are then better."""
 
     def model(points: Array) -> Array:
@@ -86,7 +87,7 @@ def test_a_descent_from_where_nothing_can_be_simulated_says_so() -> None:
 
     one = np.ones(1)
     problem = Problem(model, 0.0 * one, -one, one, np.zeros(1, dtype=bool))
-    assert descended(problem, 1e-3).misfit == np.inf
+    assert method(problem, 1e-3).misfit == np.inf
 
 
 class Valley:

@@ -80,15 +80,19 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     start = np.clip(problem.start, low + margin, high - margin)
     held = _Held(problem, start)
 
+    first = held.residuals(start[None])[0]
+    if not np.all(np.isfinite(first)):
+        untold = np.full((start.size, start.size), np.inf)
+        return Solution(start, untold, math.inf, np.zeros_like(untold))
+
     def residuals(change: Array) -> Array:
+        if not np.any(change):
+            return first
         return np.asarray(held.residuals((start + change)[None])[0])
 
     def jacobian(change: Array) -> Array:
         return held.slopes(start + change)[1]
 
-    if not np.all(np.isfinite(residuals(np.zeros_like(start)))):
-        untold = np.full((start.size, start.size), np.inf)
-        return Solution(start, untold, math.inf, np.zeros_like(untold))
     # As a change from the start, since the trust region is at first as large as what it is given,
     # or one for zero: where a fit begins is no measure of how far a first step may lead.
     result = least_squares(

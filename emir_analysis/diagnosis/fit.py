@@ -80,7 +80,7 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
     start = np.clip(problem.start, low + margin, high - margin)
     held = _Held(problem, start)
 
-    first = held.residuals(start[None])[0]
+    first: Array = held.residuals(start[None])[0]
     if not np.all(np.isfinite(first)):
         untold = np.full((start.size, start.size), np.inf)
         return Solution(start, untold, math.inf, np.zeros_like(untold))

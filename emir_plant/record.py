@@ -1,6 +1,7 @@
 """The machine's parameters as one flat record, the form in which the compiled core reads them."""
 
 import dataclasses
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,13 @@ def record(machine: Machine) -> NDArray[Any]:
     values["length_stretched"] = third_side(
         geometry.triangle_a, geometry.triangle_b, geometry.triangle_gamma0
     )
-    layout = [(name, np.float64, np.shape(value)) for name, value in values.items()]
-    return np.array([tuple(values.values())], dtype=layout)
+    return np.array([tuple(values.values())], dtype=_layout(tuple(values), modes.joint.size))
+
+
+@cache
+def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
+    """Return the record's layout: modal quantities are arrays over the modes, others scalars."""
+    return np.dtype([(n, np.float64, (modes,) if n.startswith("mode_") else ()) for n in names])
 
 
 def _with_effects(machine: Machine) -> Geometry:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from emir_common.parameter_tree import declared
 from emir_plant.actuator.parameters import Actuator
-from emir_plant.jit import compiled
+from emir_plant.jit import compiled_for_threads, compiled_in_place
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def field(path: str) -> str:
     return path.replace(".", "_")
 
 
-def record(actuator: Actuator) -> Any:
+def record(actuator: Actuator) -> NDArray[Any]:
     """Return the parameters as the flat record, (1,), that the compiled functions read."""
     values = {field(path): value for path, (_, value) in declared(actuator).items()}
     return np.array([tuple(values.values())], dtype=_fields(tuple(values)))
@@ -64,12 +64,12 @@ def simulate(actuator: Actuator, command: Array, period: float, start: float = 0
     command: (n,) valve opening, straight between its samples. period: time between them. start:
     pressure at the first sample.
     """
-    return run(record(actuator), command, period, start)
+    return run_each(record(actuator), command, period, start)[0]
 
 
-def run(parameters: Any, command: Array, period: float, start: float) -> Array:
-    """Return the same from parameters in a record: for fits, which simulate often."""
-    return np.asarray(_run(parameters, command, np.zeros(0), period, start)[:, 0])
+def run_each(parameters: NDArray[Any], command: Array, period: float, start: float) -> Array:
+    """Return the same of many machines, (m, n). parameters: (m,) records."""
+    return np.asarray(_run_each(parameters, command, np.zeros(0), period, start)[:, :, 0])
 
 
 def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -> Array:
@@ -78,7 +78,7 @@ def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -
     The measured pressure (n,) goes into every term, also into the force that moves the mass.
     What the transducer sees of a line's loss is part of the integral.
     """
-    return np.asarray(_run(record(actuator), command, pressure, period, 0.0)[:, 1])
+    return np.asarray(_run_each(record(actuator), command, pressure, period, 0.0)[0, :, 1])
 
 
 def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
@@ -88,7 +88,7 @@ def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
     return Rates(flow, slope)
 
 
-@compiled
+@compiled_in_place
 def _flow(spool: float, pressure: float, p: Any) -> float:
     """Return the flow that the valve gives, in the sense of rising pressure."""
     sign = 1.0 if p.valve_gain > 0.0 else -1.0
@@ -106,7 +106,7 @@ def _flow(spool: float, pressure: float, p: Any) -> float:
     return -flow * _orifice(1.0 + p.effects_supply_pressure_droop_lowering * pressure)
 
 
-@compiled
+@compiled_in_place
 def _orifice(drop: float) -> float:
     """Return the flow's share at a relative pressure drop; 1 at a drop of 1."""
     if drop == 1.0:
@@ -115,7 +115,7 @@ def _orifice(drop: float) -> float:
     return drop / softened * np.sqrt(np.sqrt(1.0 + LAMINAR * LAMINAR))
 
 
-@compiled
+@compiled_in_place
 def _friction(velocity: float, p: Any) -> float:
     """Return what resists a velocity, as a pressure."""
     resisting = p.load_viscous_friction * velocity
@@ -125,27 +125,27 @@ def _friction(velocity: float, p: Any) -> float:
     return resisting
 
 
-@compiled
+@compiled_in_place
 def _damper(p: Any) -> float:
     """Return the elastic arm's damping, pressure per velocity."""
     stiffness = 1.0 / p.effects_elastic_boom_compliance
     return 2.0 * p.effects_elastic_boom_damping * np.sqrt(stiffness) / p.load_frequency
 
 
-@compiled
+@compiled_in_place
 def _spring_force(way: float, p: Any) -> float:
     """Return the arm's force at a way of the piston against the mass, as a pressure."""
     play = p.effects_elastic_boom_play
     return (way - min(max(way, -play), play)) / p.effects_elastic_boom_compliance
 
 
-@compiled
+@compiled_in_place
 def _share(flow: float, p: Any) -> float:
     """Return the share of the oil that is compressed beside the piston."""
     return 1.0 if flow > 0.0 else 1.0 - p.effects_load_holding_valve_line
 
 
-@compiled
+@compiled_in_place
 def _steps(p: Any, period: float) -> int:
     """Return the steps between two samples that resolve what is fastest on the oil."""
     fastest = 0.0
@@ -157,7 +157,7 @@ def _steps(p: Any, period: float) -> int:
     return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
 
 
-@compiled
+@compiled_in_place
 def _light_piston(pressure: float, damper: float, p: Any) -> float:
     """Return the velocity at which friction and the arm's damper resist with this pressure."""
     moving = max(abs(pressure) - p.effects_coulomb_friction_force, 0.0)
@@ -168,7 +168,7 @@ def _light_piston(pressure: float, damper: float, p: Any) -> float:
     return speed if pressure > 0.0 else -speed
 
 
-@compiled
+@compiled_in_place
 def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
     """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
     flow = _flow(x[SPOOL], pressure, p)
@@ -207,7 +207,7 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     return flow
 
 
-@compiled
+@compiled_in_place
 def _at(values: Any, time: float) -> float:
     """Return a sampled signal between its samples; the first or last value beyond them."""
     if time <= 0.0:
@@ -218,29 +218,29 @@ def _at(values: Any, time: float) -> float:
     return values[k] + (values[k + 1] - values[k]) * (time - k)
 
 
-@compiled
+@compiled_in_place
 def _loss(flow: float, coefficient: float) -> float:
     """Return the turbulent loss of a line."""
     return coefficient * flow * abs(flow)
 
 
-@compiled
+@compiled_in_place
 def _ahead(x: Any, step: float, slope: Any, y: Any) -> None:
     """Write x + step slope to y."""
     for i in range(STATES):
         y[i] = x[i] + step * slope[i]
 
 
-@compiled
-def _run(parameters: Any, command: Any, measured: Any, period: float, start: float) -> Any:
-    """Return measured pressure and the integral of its modelled rate, (n, 2), by RK4 steps.
+@compiled_in_place
+def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
+    p: Any, command: Any, measured: Any, period: float, start: float, work: Any, shown: Any
+) -> None:
+    """Write measured pressure and the integral of its modelled rate, (n, 2), by RK4 steps.
 
     measured: pressure that goes into every term, or nothing: then the simulated one does.
+    work: (6, STATES) of zeros.
     """
-    p = parameters[0]
-    shown = np.empty((command.size, 2))
-    x, y = np.zeros(STATES), np.zeros(STATES)
-    a, b, c, d = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES)
+    x, y, a, b, c, d = work[0], work[1], work[2], work[3], work[4], work[5]
     free = measured.size == 0
     steps = _steps(p, period)
     h = period / steps
@@ -273,6 +273,18 @@ def _run(parameters: Any, command: Any, measured: Any, period: float, start: flo
             for i in range(STATES):
                 x[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
         if not abs(x[PRESSURE]) < NOWHERE:
-            shown[k + 1 :] = NOWHERE
+            for later in range(k + 1, command.size):
+                shown[later, 0] = shown[later, 1] = NOWHERE
             break
+
+
+@compiled_for_threads
+def _run_each(
+    parameters: NDArray[Any], command: Array, measured: Array, period: float, start: float
+) -> Array:
+    """Return what `_write_run` writes for each of (m,) records, (m, n, 2)."""
+    machines = parameters.size
+    work, shown = np.zeros((machines, 6, STATES)), np.empty((machines, command.size, 2))
+    for m in range(machines):
+        _write_run(parameters[m], command, measured, period, start, work[m], shown[m])
     return shown

@@ -20,7 +20,7 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet, simulate
-from emir_plant.actuator.model import field, run
+from emir_plant.actuator.model import field, run_each
 from emir_plant.actuator.model import record as flat_record
 
 STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
@@ -125,31 +125,35 @@ class _Surplus:
         self._measured = record.pressure[self._part]
         slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
         self.independent = INDEPENDENT * self._measured.size / slow
-        self._parameters = flat_record(sheet.machine)
+        self._stated = flat_record(sheet.machine)
         self._places = [field(member.path) for member in members]
 
-    def _error(self, x: Array) -> Array:
-        for place, member, v in zip(self._places, self.members, x, strict=True):
-            self._parameters[place] = member.value(float(v))
+    def _errors(self, points: Array) -> Array:
+        """Return simulated minus measured pressure, (m, n), at places, (m, k)."""
+        machines = np.repeat(self._stated, len(points))
+        for place, member, column in zip(self._places, self.members, points.T, strict=True):
+            machines[place] = [member.value(float(x)) for x in column]
         r = self._record
-        simulated = run(self._parameters, r.opening, r.period, float(r.pressure[0]))
-        return np.asarray(simulated[self._part] - self._measured)
+        simulated = run_each(machines, r.opening, r.period, float(r.pressure[0]))
+        return np.asarray(simulated[:, self._part] - self._measured)
 
     def rms(self, x: Array) -> float:
         """Return the rms error."""
-        return math.sqrt(float(np.mean(self._error(x) ** 2)))
+        return math.sqrt(float(np.mean(self._errors(x[None]) ** 2)))
 
     def at(self, x: Array, rms: float) -> Array:
         """Return deviations and errors; rms: the error that is expected."""
+        return np.asarray(self._each_at(x[None], rms)[0])
+
+    def _each_at(self, points: Array, rms: float) -> Array:
         weight = math.sqrt(self.independent / self._measured.size) / rms
-        return np.concatenate([(x - self.expected) / self.deviation, weight * self._error(x)])
+        deviations = (points - self.expected) / self.deviation
+        return np.hstack([deviations, weight * self._errors(points)])
 
     def _jacobian(self, x: Array, rms: float) -> Array:
-        here = self.at(x, rms)
         steps = np.where(x + STEP > self.high, -STEP, STEP)
-        moved = x + np.diag(steps)
-        columns = [(self.at(row, rms) - here) / s for row, s in zip(moved, steps, strict=True)]
-        return np.stack(columns, 1)
+        here, *moved = self._each_at(np.vstack([x, x + np.diag(steps)]), rms)
+        return np.stack([(there - here) / s for there, s in zip(moved, steps, strict=True)], 1)
 
     def _inside(self, x: Array) -> Array:
         margin = 1e-6 * (self.high - self.low)
@@ -159,7 +163,8 @@ class _Surplus:
         """Return places drawn from what is expected, the same every time, the best first."""
         random = np.random.default_rng(0).standard_normal((PLACES, self.expected.size))
         places = self._inside(self.expected + self.deviation * random)
-        return sorted(places, key=lambda x: float(np.sum(self.at(x, rms) ** 2)))
+        cost = np.sum(self._each_at(places, rms) ** 2, axis=1)
+        return [places[k] for k in np.argsort(cost, kind="stable")]
 
     def least(self, start: Array, rms: float) -> OptimizeResult:
         """Return the minimum that is reached from a place."""

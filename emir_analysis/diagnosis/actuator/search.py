@@ -1,8 +1,11 @@
 """Which effects an actuator has: chosen by the evidence of the recording for each set of them."""
 
 import math
+import os
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +23,7 @@ SETTLED = 8  # sets of which each starts once more from the others' machines
 BARE_MENTION = 0.5 * math.log(10.0)  # in the evidence: "barely worth mentioning" (Jeffreys 1961)
 
 Progress = Callable[[str], None]
+Thing = TypeVar("Thing")
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ def search(
     progress("the best from each other's machines")
     good = _first(tried.values(), SETTLED)
     machines = [f.machine for f in good]
-    again = [fit(sheet, f.effects, record, machines, drawn=DRAWN) for f in good]
+    again = _each(good, lambda f: fit(sheet, f.effects, record, machines, drawn=DRAWN))
     tried |= {_key(f): f for f in again}
     ordered = _first(tried.values(), len(tried))
     as_good = [f for f in ordered if f.evidence > ordered[0].evidence - BARE_MENTION]
@@ -95,19 +99,25 @@ def _neighbours(
     sets = [_key(parent) ^ {name} for name in REGISTRY]
     new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
-    first = [fit(sheet, effects, record, [parent.machine]) for effects in ordered]
+    first = _each(ordered, lambda effects: fit(sheet, effects, record, [parent.machine]))
     first = _first(first, len(first))
-    half = len(first) // 2
-    again = [fit(sheet, f.effects, record, [f.machine], drawn=DRAWN) for f in first[:half]]
-    return [*again, *first[half:]]
+    better, others = first[: len(first) // 2], first[len(first) // 2 :]
+    again = _each(better, lambda f: fit(sheet, f.effects, record, [f.machine], drawn=DRAWN))
+    return [*again, *others]
 
 
 def _unseen(sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord) -> float:
     """Return the RMS error of all parts, each by a fit that knows nothing of it."""
     number = np.arange(record.pressure.size) * PARTS // record.pressure.size
+    parts = [number == part for part in range(PARTS)]
+    fits = _each(parts, lambda part: fit(sheet, effects, record, seen=~part, drawn=DRAWN_ALONE))
     error = np.zeros(record.pressure.size)
-    for part in range(PARTS):
-        left_out = number == part
-        fitted = fit(sheet, effects, record, seen=~left_out, drawn=DRAWN_ALONE)
-        error[left_out] = free_run_error(fitted.machine, record)[left_out]
+    for part, fitted in zip(parts, fits, strict=True):
+        error[part] = free_run_error(fitted.machine, record)[part]
     return float(np.sqrt(np.mean(error**2)))
+
+
+def _each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:
+    """Return the fit of each thing, fitted side by side on all cores."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return list(threads.map(fitted, things))

@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import PRESSURE_LOWERING, Experiment
 from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
-from emir_analysis.diagnosis.unknowns import Unknowns, unknowns
+from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
@@ -167,7 +167,8 @@ def shapes(start: Trial, effect: str, evidence: Evidence) -> list[Trial]:
 def _shapes(start: Trial, effect: str) -> Array:
     """Return vectors, (m, k), that differ in those fields of an effect that are no sizes.
 
-    The trial's own is the first; of more than MOST_SHAPING such fields it is the only one.
+    The trial's own is the first; of more than MOST_SHAPING such fields it is the only one. In
+    shares they differ one at a time, in the others in all combinations.
     """
     members, sizes = start.unknowns.members, REGISTRY[effect].sizes
     shaping = [
@@ -175,21 +176,31 @@ def _shapes(start: Trial, effect: str) -> Array:
         for k, u in enumerate(members)
         if u.path.startswith(f"effects.{effect}.") and u.path.rsplit(".", 1)[1] not in sizes
     ]
-    if len(shaping) > MOST_SHAPING:
+    shares = [k for k in shaping if members[k].is_share]
+    others = [k for k in shaping if not members[k].is_share]
+    if len(others) > MOST_SHAPING:
         return start.x[None]
-    levels = []
-    for k in shaping:
-        x, u = float(start.x[k]), members[k]
-        others = [x - SHAPE_STEP, x + SHAPE_STEP] if u.logarithmic else []
-        others += [u.low, u.high] if u.is_share else []
-        others = [float(np.clip(v, u.low, u.high)) for v in others]
-        levels.append(list(dict.fromkeys([x, u.start, *others])))
-    points = []
-    for chosen in product(*levels):
-        point = start.x.copy()
-        point[shaping] = chosen
-        points.append(point)
+    points = [_moved(start.x, others, at) for at in product(*(_levels(start, k) for k in others))]
+    points += [_moved(start.x, [k], (at,)) for k in shares for at in _ends(members[k])]
     return np.array(points)
+
+
+def _levels(start: Trial, k: int) -> list[float]:
+    """Return the values of an unknown that are tried, its own first."""
+    x, u = float(start.x[k]), start.unknowns.members[k]
+    others = [x - SHAPE_STEP, x + SHAPE_STEP] if u.logarithmic else []
+    others = [float(np.clip(v, u.low, u.high)) for v in others]
+    return list(dict.fromkeys([x, u.start, *others]))
+
+
+def _ends(share: Unknown) -> tuple[float, float, float]:
+    return share.low, share.start, share.high
+
+
+def _moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:
+    point = x.copy()
+    point[list(places)] = values
+    return point
 
 
 def refine_free_run(known: Trial, evidence: Evidence) -> Trial:

@@ -26,13 +26,23 @@ def nested(full: Trial, less: Trial) -> bool:
 def fullest(known: Trial, sheet: Sheet) -> Trial:
     """Return a trial with the friction that has all others in it but the load's.
 
-    The maker's parameters are as stated again: instants of sticking have led them astray.
+    It comes by tanh. The maker's parameters are as stated again: instants of sticking have led them
+    astray.
     """
     for name in known.effects:
         if name in {*DRY, VISCOUS}:
             known = known.without(name)
     known = known.at(np.where(known.unknowns.toleranced, 0.0, known.x))
-    return trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
+    found = trial(sheet, (*known.effects, STRIBECK, VISCOUS), known)
+    return found.fixed(_share(STRIBECK), 0.0)
+
+
+def gradual(known: Trial) -> Trial:
+    """Return a trial whose dry friction comes gradually in place of by tanh."""
+    for name in known.effects:
+        if name in DRY:
+            known = known.fixed(_share(name), 1.0)
+    return known
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
@@ -63,8 +73,13 @@ def viscous_is_heard(known: Trial, evidence: Evidence, floor: Array) -> bool:
 def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:
     values, others = full.unknowns.values(full.x), full.without(STRIBECK)
     found = trial(sheet, (*others.effects, COULOMB), others)
+    found = found.fixed(_share(COULOMB), full.machine.effects.stribeck_friction.gradual_share)
     x = found.x.copy()
     for k, unknown in enumerate(found.unknowns.members):
         if unknown.path.startswith(f"effects.{COULOMB}."):
             x[k] = unknown.at(values[unknown.path.replace(COULOMB, STRIBECK)])
     return found.at(x)
+
+
+def _share(effect: str) -> str:
+    return f"effects.{effect}.gradual_share"

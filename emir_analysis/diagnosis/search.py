@@ -22,6 +22,7 @@ from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
     fullest,
+    gradual,
     nested,
     sticks,
     viscous_is_heard,
@@ -87,6 +88,7 @@ class Search:
         self.tried: list[Tried] = []
         self._whole: dict[tuple[str, ...], Trial] = {}
         self._settled: tuple[str, ...] = ()  # effects that are known to be needed
+        self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
@@ -148,7 +150,8 @@ class Search:
             fitted = refine_free_run(chosen, self._evidence)
             if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
                 fitted = self._with_fewer_sizes(fitted)
-                fitted = fitted if sticks(fitted) else self._refined_again(fitted)
+                again = self._led_again if sticks(fitted) else self._refined_again
+                fitted = again(fitted)
             self._whole[chosen.effects] = self._with_simple_shares(fitted)
         return self._whole[chosen.effects]
 
@@ -163,6 +166,13 @@ class Search:
                 break
             fitted = again
         return fitted
+
+    def _led_again(self, fitted: Trial) -> Trial:
+        """Return a trial that sticks led along a beginning that grows, if that is better.
+
+        Over all of a recording at once a fit ends close to where it began.
+        """
+        return min(fitted, grown(fitted, self._evidence), key=self._on_whole)
 
     def _with_fewer_sizes(self, full: Trial) -> Trial:
         """Return a trial with one size of its effects alone where that is better than with all.
@@ -231,12 +241,16 @@ class Search:
     def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
         """Return the best trials, one that sticks, with the friction that a beginning tells.
 
-        The same where that is no better on the whole, or where they leave nothing.
+        The same where that is no better on the whole, where they leave nothing, or where the
+        beginning was asked before.
         """
         if self._excess(best.trial) <= LEFT**2 - 1.0:
             return equal, best
-        self._progress(f"friction by a growing beginning: {best.trial.name}")
         start = fullest(best.trial, self._sheet)
+        if start.effects in self._begun:
+            return equal, best
+        self._begun.add(start.effects)
+        self._progress(f"friction by a growing beginning: {best.trial.name}")
         law = begun(start, self._evidence, self.floor)
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
         if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
@@ -253,9 +267,14 @@ class Search:
     def _grown(self, law: Trial, fuller: list[Trial]) -> Trial:
         """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
 
-        A break-away may show in later sticks than those of the beginning.
+        A break-away may show in later sticks than those of the beginning, and whether friction
+        comes by tanh or gradually shows in many sticks only.
         """
         found = self._heard(grown(law, self._evidence))
+        if self._excess(found) > LEFT**2 - 1.0:
+            other = self._heard(grown(gradual(law), self._evidence))
+            if self._on_whole(other) < self._on_whole(found):
+                found, fuller = other, [gradual(more) for more in fuller]
         for more in fuller:
             if at_noise(found, self._evidence):
                 break

@@ -11,15 +11,19 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Force against the motion of the piston: F_c tanh(v / v_0)."""
+    """Force against the motion of the piston: F_c tanh(v / v_0).
+
+    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0).
+    """
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = "seal friction, 1-3 % of the load"
-    trial: ClassVar[dict[str, float]] = {"force": 3e3}
+    trial: ClassVar[dict[str, float]] = {"force": 3e3, "gradual_share": 0.5}
 
     force: float = quantity("N", 0.0, 1e5, "F_c", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
+    gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
 @compiled
@@ -27,4 +31,5 @@ def friction(velocity: float, p: Any) -> float:
     """Return the friction force on the piston, N; it has the sign of the velocity, m/s."""
     if p.coulomb_friction_force == 0.0:
         return 0.0
-    return p.coulomb_friction_force * smooth_sign(velocity / p.coulomb_friction_smoothing_speed)
+    number = velocity / p.coulomb_friction_smoothing_speed
+    return p.coulomb_friction_force * smooth_sign(number, p.coulomb_friction_gradual_share)

@@ -11,15 +11,19 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class PressureDependentFriction(Effect):
-    """Force against the motion: mu |p_H A_H - p_S A_S| tanh(v / v_0)."""
+    """Force against the motion: mu |p_H A_H - p_S A_S| tanh(v / v_0).
+
+    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0).
+    """
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
     source: ClassVar[str] = "seal and bearing friction, 1-3 % of the load"
-    trial: ClassVar[dict[str, float]] = {"coefficient": 0.02}
+    trial: ClassVar[dict[str, float]] = {"coefficient": 0.02, "gradual_share": 0.5}
 
     coefficient: float = quantity("1", 0.0, 0.2, "mu", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=2e-3)
+    gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
 @compiled
@@ -28,4 +32,5 @@ def friction(velocity: float, load: float, p: Any) -> float:
     if p.pressure_dependent_friction_coefficient == 0.0:
         return 0.0
     level = p.pressure_dependent_friction_coefficient * abs(load)
-    return level * smooth_sign(velocity / p.pressure_dependent_friction_smoothing_speed)
+    number = velocity / p.pressure_dependent_friction_smoothing_speed
+    return level * smooth_sign(number, p.pressure_dependent_friction_gradual_share)

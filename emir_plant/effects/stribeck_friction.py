@@ -12,17 +12,26 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class StribeckFriction(Effect):
-    """Force against the motion: tanh(v/v_0) F_c [1 + (b - 1) exp(-(v/v_s)^2)]."""
+    """Force against the motion: tanh(v/v_0) F_c [1 + (b - 1) exp(-(v/v_s)^2)].
+
+    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0).
+    """
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = "breakaway 1.3 times the sliding force, v_s 5-10 mm/s"
-    trial: ClassVar[dict[str, float]] = {"force": 3e3, "breakaway": 1.5, "stribeck_speed": 7e-3}
+    trial: ClassVar[dict[str, float]] = {
+        "force": 3e3,
+        "breakaway": 1.5,
+        "stribeck_speed": 7e-3,
+        "gradual_share": 0.5,
+    }
 
     force: float = quantity("N", 0.0, 1e5, "F_c, while sliding fast", default=0.0)
     breakaway: float = quantity("1", 1.0, 5.0, "F_s / F_c", default=1.3)
     stribeck_speed: float = quantity("m/s", 1e-4, 0.2, "v_s", default=7e-3)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
+    gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
 @compiled
@@ -32,4 +41,5 @@ def friction(velocity: float, p: Any) -> float:
         return 0.0
     hump = math.exp(-((velocity / p.stribeck_friction_stribeck_speed) ** 2))
     level = p.stribeck_friction_force * (1.0 + (p.stribeck_friction_breakaway - 1.0) * hump)
-    return level * smooth_sign(velocity / p.stribeck_friction_smoothing_speed)
+    number = velocity / p.stribeck_friction_smoothing_speed
+    return level * smooth_sign(number, p.stribeck_friction_gradual_share)

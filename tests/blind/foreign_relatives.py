@@ -1,8 +1,8 @@
 """Effects of the catalogue by other laws than the registry's, for `emir blind --foreign`.
 
 Another author would have written them so. Each is named after the effect that it is a relative
-of: `found` with that name, or `unexplained`, is a good answer, another name is not. The last three
-have a stroke with a sensor of its own.
+of: `found` with that name, or `unexplained`, is a good answer, another name is not. Those with
+"own stroke" in their name have a stroke with a sensor of its own.
 """
 
 import math
@@ -259,6 +259,38 @@ class MeasuredBias(Hidden):
         return np.asarray(super().stated_stroke(angle - self.sizes["beside"]))
 
 
+class CreepingFriction(Hidden):
+    """Dry friction with an arc tangent for its sign, which is gradual far from rest, too."""
+
+    name = "coulomb_friction~arc tangent"
+    grows = ("creeps",)
+    scales: ClassVar[dict[str, Scale]] = {"creeps": lifting_force}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"creeps": between(random, 5e3, 2.5e4), "creeping": between(random, 2e-4, 2e-3)}
+
+    def resistance(self, velocity: float, force: float, stroke: float) -> float:
+        sign = 2.0 / math.pi * math.atan(velocity / self.sizes["creeping"])
+        return super().resistance(velocity, force, stroke) + self.sizes["creeps"] * sign
+
+
+class StraightFriction(Hidden):
+    """Dry friction that rises along a straight line up to a small speed, then stays."""
+
+    name = "coulomb_friction~straight"
+    grows = ("rubs",)
+    scales: ClassVar[dict[str, Scale]] = {"rubs": lifting_force}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"rubs": between(random, 5e3, 2.5e4), "up_to": between(random, 2e-4, 2e-3)}
+
+    def resistance(self, velocity: float, force: float, stroke: float) -> float:
+        sign = min(max(velocity / self.sizes["up_to"], -1.0), 1.0)
+        return super().resistance(velocity, force, stroke) + self.sizes["rubs"] * sign
+
+
 FOREIGN: tuple[type[Hidden], ...] = (
     TurbulentLeak,
     TurbulentDrip,
@@ -272,4 +304,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     MeasuredTriangle,
     MeasuredWave,
     MeasuredBias,
+    CreepingFriction,
+    StraightFriction,
 )

@@ -97,7 +97,7 @@ def test_a_healthy_machine_moves_as_the_projects_own() -> None:
 SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
     hidden.CoulombFriction: (
         {"coulomb_force": 2e4, "coulomb_smoothing": 1e-3},
-        {"force": 2e4, "smoothing_speed": 1e-3},
+        {"force": 2e4, "smoothing_speed": 1e-3, "gradual_share": 1.0},
     ),
     hidden.StribeckFriction: (
         {
@@ -106,12 +106,18 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
             "stribeck_speed": 1e-2,
             "stribeck_smoothing": 1e-3,
         },
-        {"force": 1e4, "breakaway": 2.0, "stribeck_speed": 1e-2, "smoothing_speed": 1e-3},
+        {
+            "force": 1e4,
+            "breakaway": 2.0,
+            "stribeck_speed": 1e-2,
+            "smoothing_speed": 1e-3,
+            "gradual_share": 1.0,
+        },
     ),
     hidden.ViscousFriction: ({"viscous": 2e5}, {"coefficient": 2e5}),
     hidden.PressureDependentFriction: (
         {"share_of_load": 0.03, "share_smoothing": 1e-3},
-        {"coefficient": 0.03, "smoothing_speed": 1e-3},
+        {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0},
     ),
     hidden.Payload: ({"mass": 300.0}, {"mass": 300.0}),
     hidden.ExternalLoad: (
@@ -192,7 +198,7 @@ def test_an_effect_written_twice_does_the_same(
     error = apart(run, of_plant({f"{name}.{k}": v for k, v in there.items()}, commands))
     loudest = max(SIGNALS, key=lambda name: made[name] / SIGNALS[name])
     assert made[loudest] > 10.0 * SIGNALS[loudest]  # else nothing is compared
-    # what is left is the other smoothing, or sampled against continuous
+    # what is left is sampled against continuous
     assert error[loudest] < 0.05 * made[loudest], error
 
 

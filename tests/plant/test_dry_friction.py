@@ -149,7 +149,14 @@ def test_friction_changes_by_no_more_than_a_step_allows() -> None:
 
 @pytest.mark.parametrize("number", [-1e3, -20.0, -0.5, -1e-9, 0.0, 1e-3, 0.7, 3.0, 18.0, 800.0])
 def test_the_smooth_sign_is_the_hyperbolic_tangent(number: float) -> None:
-    assert abs(smooth_sign(number) - math.tanh(number)) <= 2.3e-16
+    assert abs(smooth_sign(number, 0.0) - math.tanh(number)) <= 2.3e-16
+
+
+@pytest.mark.parametrize("number", [-30.0, -0.5, 0.0, 1e-3, 4.0, 800.0])
+def test_the_gradual_sign_is_the_sine_of_the_arc_tangent(number: float) -> None:
+    assert smooth_sign(number, 1.0) == pytest.approx(math.sin(math.atan(number)), abs=1e-15)
+    middle = 0.5 * (math.tanh(number) + math.sin(math.atan(number)))
+    assert smooth_sign(number, 0.5) == pytest.approx(middle, abs=1e-15)
 
 
 def test_a_swing_is_followed_finely_only_where_it_reaches_standstill() -> None:

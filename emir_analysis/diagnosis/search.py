@@ -271,7 +271,7 @@ class Search:
         comes by tanh or gradually shows in many sticks only.
         """
         found = self._heard(grown(law, self._evidence))
-        if self._excess(found) > LEFT**2 - 1.0:
+        if LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2:
             other = self._heard(grown(gradual(law), self._evidence))
             if self._on_whole(other) < self._on_whole(found):
                 found, fuller = other, [gradual(more) for more in fuller]

@@ -181,7 +181,7 @@ def _shapes(start: Trial, effect: str) -> Array:
     if len(others) > MOST_SHAPING:
         return start.x[None]
     points = [_moved(start.x, others, at) for at in product(*(_levels(start, k) for k in others))]
-    points += [_moved(start.x, [k], (at,)) for k in shares for at in _ends(members[k])]
+    points += [_moved(start.x, [k], (at,)) for k in shares for at in _shares(members[k])]
     return np.array(points)
 
 
@@ -193,7 +193,8 @@ def _levels(start: Trial, k: int) -> list[float]:
     return list(dict.fromkeys([x, u.start, *others]))
 
 
-def _ends(share: Unknown) -> tuple[float, float, float]:
+def _shares(share: Unknown) -> tuple[float, float, float]:
+    """Return the values of a share that are tried: none, what a search starts at, all."""
     return share.low, share.start, share.high
 
 

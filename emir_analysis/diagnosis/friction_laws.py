@@ -14,7 +14,7 @@ DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 
 def sticks(known: Trial) -> bool:
     """Tell whether a trial has dry friction."""
-    return any(name in DRY for name in known.effects)
+    return bool(_dry(known))
 
 
 def nested(full: Trial, less: Trial) -> bool:
@@ -39,10 +39,19 @@ def fullest(known: Trial, sheet: Sheet) -> Trial:
 
 def gradual(known: Trial) -> Trial:
     """Return a trial whose dry friction comes gradually in place of by tanh."""
-    for name in known.effects:
-        if name in DRY:
-            known = known.fixed(_share(name), 1.0)
+    for name in _dry(known):
+        known = known.fixed(_share(name), 1.0)
     return known
+
+
+def is_gradual(known: Trial) -> bool:
+    """Tell whether all of a trial's dry friction comes gradually."""
+    shares = [getattr(known.machine.effects, name).gradual_share for name in _dry(known)]
+    return all(share == 1.0 for share in shares)
+
+
+def _dry(known: Trial) -> list[str]:
+    return [name for name in known.effects if name in DRY]
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:

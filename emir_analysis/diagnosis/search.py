@@ -23,6 +23,7 @@ from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
     fullest,
     gradual,
+    is_gradual,
     nested,
     sticks,
     viscous_is_heard,
@@ -271,7 +272,8 @@ class Search:
         comes by tanh or gradually shows in many sticks only.
         """
         found = self._heard(grown(law, self._evidence))
-        if LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2:
+        off = LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2
+        if off and not is_gradual(law):
             other = self._heard(grown(gradual(law), self._evidence))
             if self._on_whole(other) < self._on_whole(found):
                 found, fuller = other, [gradual(more) for more in fuller]

@@ -16,7 +16,13 @@ from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
-from emir_analysis.diagnosis.friction_laws import STRIBECK, VISCOUS, simpler, viscous_is_heard
+from emir_analysis.diagnosis.friction_laws import (
+    STRIBECK,
+    VISCOUS,
+    gradual,
+    simpler,
+    viscous_is_heard,
+)
 from emir_analysis.diagnosis.friction_starts import friction_starts
 from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, STRONG, score
 from emir_analysis.signals import Array
@@ -33,9 +39,11 @@ NEAR_END = 1.1  # times a beginning
 FOLLOWS = 1.02  # times the error so far: the most over a longer beginning that it follows
 DRAWN = 1500.0  # s, simulated of machines drawn from what a beginning leaves open ...
 DRAWN_OF_EACH = 500.0  # s, the same of each while several are led, or where the law is off
-DRAWS = 3  # times that they are drawn, until a fit from the best leaves no more than ...
+DRAWS = 6  # times that they are drawn, until a fit from the best leaves no more than ...
 AS_BEFORE = 1.01  # times what was left before
+WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
+LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-3  # relative, of the free run's squared error
 ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
@@ -48,8 +56,21 @@ def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
 
     Over the first beginning it is fitted from those shapes of the friction near standstill whose
     free run is best there. The best fits are led on, fewer each time: it takes some sticks to
-    tell two minima apart. floor: (5,) what the sensors leave in each balance.
+    tell two minima apart. Where that leaves more than LEFT, it is begun with friction that comes
+    gradually, too: fitted by tanh, that has led to another minimum. floor: (5,) what the sensors
+    leave in each balance.
     """
+    found = _begun(start, evidence, floor)
+    if found.misfit > LEFT:
+        slow = gradual(start)
+        other = _begun(slow, evidence, floor)
+        if other.misfit < found.misfit:
+            return slow.continued(other)
+    return start.continued(found)
+
+
+def _begun(start: Trial, evidence: Evidence, floor: Array) -> Solution:
+    """Return the fit of one law to the free run of a beginning that grows to DECIDED."""
     if evidence.told[FORCE]:
         starts = friction_starts(start, evidence, floor, FIRST)
     else:
@@ -67,7 +88,7 @@ def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
         points = [_begin(start, evidence, each, time, longer) for each in best]
         fits = [_fitted(start, evidence.until(longer), x, ROUGH) for x in points]
         time = longer
-    return start.continued(_led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit))
+    return _led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit)
 
 
 def _distinct(fits: list[Solution]) -> list[Solution]:
@@ -182,6 +203,8 @@ def _found_again(
     found: list[Solution] = []
     for draw in range(draws):
         x = _drawn(known, evidence, fitted, DRAWN if draws > 1 else DRAWN_OF_EACH, draw)
+        if found and np.array_equal(x, fitted.x):
+            continue  # none of them is better than where it was
         found.append(_fitted(known, evidence, x, ACCURACY, method, fitted.curvature))
         if found[-1].misfit <= AS_BEFORE * fitted.misfit:
             break
@@ -204,6 +227,8 @@ def _drawn(
     """
     count = int(seconds / evidence.duration(1.0))
     others = fitted.drawn((draw + 1) * count)[draw * count :]
+    if draw % 2:
+        others = fitted.x + WIDER * (others - fitted.x)
     points = np.vstack([fitted.x, others])
     return np.asarray(points[int(np.argmin(_errors(known, evidence, points)))])
 

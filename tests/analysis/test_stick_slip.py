@@ -7,8 +7,10 @@ import pytest
 import recorded
 from test_diagnosis_search import TOLERANCES, operated, search
 
-from emir_analysis.diagnosis.candidates import fit_balances, free_run_errors, trial
-from emir_analysis.diagnosis.friction_laws import fullest, nested
+from emir_analysis.diagnosis import stick_slip
+from emir_analysis.diagnosis.candidates import Trial, fit_balances, free_run_errors, trial
+from emir_analysis.diagnosis.fit import Solution
+from emir_analysis.diagnosis.friction_laws import fullest, is_gradual, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.stick_slip import FIRST, STARTS, begun, grown, with_less_friction
 from emir_common.parameter_tree import with_values
@@ -80,6 +82,25 @@ def test_viscous_friction_that_is_not_heard_takes_no_break_away_with_it() -> Non
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     least, *_ = with_less_friction(law, evidence, sheet, searched.floor)
     assert least.effects == ("stribeck_friction",)
+
+
+@pytest.mark.parametrize(
+    ("by_tanh", "gradually", "share"), [(0.97, 0.9, 0.0), (1.06, 0.93, 1.0), (1.06, 1.07, 0.0)]
+)
+def test_friction_is_begun_gradually_where_tanh_leaves_more_than_the_noise(
+    monkeypatch: pytest.MonkeyPatch, by_tanh: float, gradually: float, share: float
+) -> None:
+    searched, sheet, evidence = search({})
+    start = fullest(trial(sheet, ()), sheet)
+
+    def fitted(law: Trial, *_: object) -> Solution:
+        left = gradually if is_gradual(law) else by_tanh
+        size = law.x.size
+        return Solution(law.x, np.eye(size), left, np.eye(size))
+
+    monkeypatch.setattr(stick_slip, "_begun", fitted)
+    law = begun(start, evidence, searched.floor)
+    assert law.machine.effects.stribeck_friction.gradual_share == share
 
 
 def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:

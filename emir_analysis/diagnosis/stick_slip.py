@@ -39,8 +39,10 @@ NEAR_END = 1.1  # times a beginning
 FOLLOWS = 1.02  # times the error so far: the most over a longer beginning that it follows
 DRAWN = 1500.0  # s, simulated of machines drawn from what a beginning leaves open ...
 DRAWN_OF_EACH = 500.0  # s, the same of each while several are led, or where the law is off
-DRAWS = 6  # times that they are drawn, until a fit from the best leaves no more than ...
+DRAWS = 3  # times that they are drawn, until a fit from the best leaves no more than ...
 AS_BEFORE = 1.01  # times what was left before
+EARLY = 20.0  # s, a beginning whose fit knows least of what it leaves open ...
+DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too
@@ -167,8 +169,9 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
         else:
             longer = _longer(growths[-1] * time, end)
             before = fitted.misfit
-            draws = DRAWS if holds else 1
-            fitted = _found_again(known, evidence.until(longer), fitted, method, draws)
+            draws = DRAWS_EARLY if longer <= EARLY else DRAWS
+            part = evidence.until(longer)
+            fitted = _found_again(known, part, fitted, method, draws if holds else 1)
             holds = holds and fitted.misfit <= AS_BEFORE * before
         time = longer
     return fitted

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.predictions import write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
 from emir_analysis.diagnosis.search import Progress
 from emir_analysis.diagnosis.summary import summary
+from emir_analysis.diagnosis.wiring import check_wiring
 from emir_analysis.errors import InputError
 from emir_analysis.outputs import check_outputs
 from emir_analysis.signals import SignalMap, read_signal_map
@@ -87,6 +88,7 @@ def _opened(
     progress(f"reading {path}")
     known = graph_signals(path) if signal_map is None else signal_map
     opened = open_experiment(path, known, machine)
+    check_wiring(opened, machine)
     for file in files(path):
         if not is_finished(file):
             end = float(opened.time[-1])

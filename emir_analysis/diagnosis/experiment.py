@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from emir_analysis.diagnosis.recording_checks import (
+    Stamps,
     check_before_command,
     check_command,
+    check_direction,
     check_motion,
     check_readings,
     check_sampling,
     check_values,
+    stamps,
 )
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Recording, Signal, SignalMap, load
@@ -50,7 +53,8 @@ class Experiment:
     outputs: (n, 4) in the order of OUTPUTS, SI units, NaN where there is no sensor. rest: samples
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
     the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
-    not what the stated linkage makes of the angle.
+    not what the stated linkage makes of the angle. stamps: the least steady of each kind among the
+    sensors.
     """
 
     name: str
@@ -61,6 +65,7 @@ class Experiment:
     rest: int
     measured: frozenset[str] = frozenset({ANGLE, *OUTPUTS})
     own_stroke: bool = False
+    stamps: Stamps = Stamps()
 
     @property
     def time(self) -> Array:
@@ -187,12 +192,16 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
         check_readings(name, signal, time, angle, machine)
     check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
+    check_direction(name, angle, np.append(commands, 0.0)[::every], machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
     apart = float(np.sqrt(np.mean((shown[STROKE] - _strokes(angle, machine)) ** 2)))
     measured_stroke = machine.sensors.own_stroke == 1 or apart > OWN_STROKE * noise(machine)[0]
     own_stroke = {ANGLE, STROKE} <= measured and measured_stroke
-    return Experiment(name, period, commands, angle, outputs, rest, measured, own_stroke)
+    least_steady = Stamps(*np.max([stamps(signal) for signal in sensors.values()], axis=0))
+    return Experiment(
+        name, period, commands, angle, outputs, rest, measured, own_stroke, least_steady
+    )
 
 
 def _angles(stroke: Array, machine: Machine) -> Array:

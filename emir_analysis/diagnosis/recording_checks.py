@@ -1,6 +1,7 @@
 """What makes a recording useless for a diagnosis, each said in one line with the remedy."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ NOISE = {  # of the sensors that have some
     "tip_deflection_angle": "deflection_noise",
 }
 LEAST_MOTION = 20  # resolver steps of travel below which nothing can be told from a recording
+AGAINST = 0.5  # of the whole travel, on balance, by which a boom moves against its command
 AT_REST = 0.05  # of the whole travel: a boom that sinks through a leak before its first move
 LEAST_PRESSURE = 1e-3  # of the pump's pressure; a chamber that stays below is not in Pa
 LARGEST = {  # beyond which a signal is not in its unit, and the unit that it is likely in
@@ -33,6 +35,13 @@ LARGEST = {  # beyond which a signal is not in its unit, and the unit that it is
     "piston_stroke": (20.0, "mm"),
     "tip_deflection_angle": (1.0, "mrad or deg"),
 }
+
+
+class Stamps(NamedTuple):
+    """How the stamps of a signal deviate from those of a steady period, the median one."""
+
+    scatter: float = 0.0  # s, of the gaps between them: the median
+    lost: float = 0.0  # share of the samples that are not there
 
 
 def check_sampling(name: str, signal: Signal) -> None:
@@ -134,6 +143,20 @@ def check_motion(name: str, angle: Array, machine: Machine) -> None:
         )
 
 
+def check_direction(name: str, angle: Array, commands: Array, machine: Machine) -> None:
+    """Raise InputError where the boom moves against the command: a sign is turned round.
+
+    angle: (n,) rad; commands: (n,) at the same times.
+    """
+    opened = np.where(np.abs(commands) > machine.valve.dead_zone, np.sign(commands), 0.0)
+    along = float(opened[:-1] @ np.diff(angle))
+    if along < -AGAINST * np.ptp(angle):
+        raise InputError(
+            f"{name}: the boom moves against valve_command; the sign of that or of the boom's"
+            " angle or stroke is turned round: all are positive upwards"
+        )
+
+
 def check_before_command(name: str, time: Array, angle: Array, first: float) -> None:
     """Raise InputError where the boom moves before the first command, at a time, s.
 
@@ -145,6 +168,14 @@ def check_before_command(name: str, time: Array, angle: Array, first: float) -> 
             f"{name}: moves before the first valve_command at {first:.2f} s; record the command"
             " from the start"
         )
+
+
+def stamps(signal: Signal) -> Stamps:
+    """Return how steadily a signal is sampled."""
+    gaps = np.diff(signal.time)
+    period = float(np.median(gaps))
+    scatter = float(np.median(np.abs(gaps - period)))
+    return Stamps(scatter, 1.0 - gaps.size * period / float(signal.time[-1] - signal.time[0]))
 
 
 def check_values(name: str, shown: dict[str, Array], machine: Machine) -> None:

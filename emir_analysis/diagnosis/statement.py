@@ -1,15 +1,18 @@
 """What a diagnosis has found, in words."""
 
 import math
+from collections.abc import Sequence
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.telling import movement
 
+MANY = 0.1  # share of the samples
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
@@ -42,11 +45,30 @@ def _of_findings(findings: Findings) -> str:
     if findings.verdict == "unexplained":
         rejected = " and ".join(findings.rejected)
         known = f"{rejected} comes closest but leaves too much; " if rejected else ""
-        return known + (remainder or "the balances are quiet, but the free run drifts away")
+        left = remainder or "the balances are quiet, but the free run drifts away"
+        return known + left + of_stamps(findings.evidence.experiments)
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
     return names + (f"; {remainder}" if remainder else "") + _unforeseeable(findings)
+
+
+def of_stamps(experiments: Sequence[Experiment]) -> str:
+    """Return what of the sensors' stamps may be the reason why nothing explains recordings.
+
+    A sample taken 3 ms beside its stamp is off by several times the noise where the boom moves,
+    and what is interpolated over several lost samples no less.
+    """
+    scatter = max(each.stamps.scatter for each in experiments)
+    if scatter > COMMAND_STEP:
+        return (
+            f"; the sensors' stamps scatter by {1e3 * scatter:.1f} ms about a steady period: if"
+            " they are not the times of measurement, record again with those"
+        )
+    lost = max(each.stamps.lost for each in experiments)
+    if lost > MANY:
+        return f"; {100 * lost:.0f} % of a sensor's samples are missing: record again with all"
+    return ""
 
 
 def _unforeseeable(findings: Findings) -> str:

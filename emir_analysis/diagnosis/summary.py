@@ -1,12 +1,13 @@
 """The result of a diagnosis as lines for a terminal."""
 
-from emir_analysis.diagnosis.result import Diagnosis, SignalResult
+from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult
 
 
 def summary(result: Diagnosis) -> str:
     """Return the result as lines for a terminal."""
     lines = [f"{result.verdict}: {result.statement}"]
     lines += cautions(result)
+    lines += [line for effect in result.effects for line in _sizes(effect)]
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in result.balances.items():
         figures = (b.noise, b.before, b.refitted, b.after)
@@ -22,6 +23,14 @@ def summary(result: Diagnosis) -> str:
     for name, c in result.control.items():
         lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
     return "\n".join(lines)
+
+
+def _sizes(effect: EffectResult) -> list[str]:
+    """Return an effect's parameters with their intervals, a line for each."""
+    return [
+        f"{effect.name + '.' + name:48}{p.value:11.4g}  ({p.low:.4g} ... {p.high:.4g}) {p.unit}"
+        for name, p in effect.parameters.items()
+    ]
 
 
 def cautions(result: Diagnosis) -> list[str]:

@@ -65,8 +65,9 @@ demo: install
 	@echo 'Report     $(CURDIR)/$(OUT).html'
 	@echo 'Figures    $(CURDIR)/$(OUT).json'
 
+# On all cores, up to four; each file's tests in one process, since they share what takes long to make.
 test: install
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 lint: install
 	$(BIN)/python -m ruff check .

@@ -1,11 +1,11 @@
 """Play between piston and joint: the piston crosses it when the force changes sign."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled
 
 
@@ -14,23 +14,26 @@ class Backlash(Effect):
     """Offset s of the piston against the joint, T ds/dt = (gap / 2) tanh(F / F_s) - s.
 
     F is the oil's force: well above the seating force F_s the piston rests on one flank, well
-    below -F_s on the other, and in between it is on its way.
+    below -F_s on the other, and in between it is on its way. For gradual_share of it
+    F / sqrt(F^2 + F_s^2) in place of tanh(F / F_s).
     """
 
     balance: ClassVar[Balance] = "kinematics"
     sizes: ClassVar[tuple[str, ...]] = ("gap",)
     source: ClassVar[str] = "worn pins and bushings, 0.1-1 mm"
-    trial: ClassVar[dict[str, float]] = {"gap": 5e-4}
+    trial: ClassVar[dict[str, float]] = {"gap": 5e-4, "gradual_share": 0.5}
 
     gap: float = quantity("m", 0.0, 5e-3, "from flank to flank", default=0.0)
     seating_force: float = quantity("N", 1e4, 1e6, "F_s, at which a flank is met", default=2e4)
+    gradual_share: float = quantity("1", 0.0, 1.0, "of F/sqrt(F^2 + F_s^2)", default=0.0)
     crossing_time: float = quantity("s", 0.01, 0.5, "T, of the film in the bearing", default=0.01)
 
 
 @compiled
 def flank(force: float, p: Any) -> float:
     """Return where the piston rests against the joint, m, under a steady force, N."""
-    return 0.5 * p.backlash_gap * math.tanh(force / p.backlash_seating_force)
+    seated = smooth_sign(force / p.backlash_seating_force, p.backlash_gradual_share)
+    return 0.5 * p.backlash_gap * seated
 
 
 @compiled

@@ -211,9 +211,10 @@ def test_leakage_never_feeds_energy_in(name: str) -> None:
         assert lost >= 0.0
 
 
-def test_backlash_takes_energy_on_every_closed_path() -> None:
+@pytest.mark.parametrize("gradual_share", [0.0, 1.0])
+def test_backlash_takes_energy_on_every_closed_path(gradual_share: float) -> None:
     """Work of the oil on the play over a period, however fast the force swings."""
-    p = _with(backlash={"gap": 1e-3}).record[0]
+    p = _with(backlash={"gap": 1e-3, "gradual_share": gradual_share}).record[0]
     for period in (0.02, 0.1, 1.0):
         dt = period / 2000
         force = 1e5 * np.sin(2.0 * math.pi * np.arange(6000) * dt / period)
@@ -343,9 +344,10 @@ def test_play_shifts_the_piston_by_the_gap_when_the_force_changes_sign() -> None
     assert shift[0] - shift[1] == pytest.approx(gap, rel=1e-3)
 
 
-def test_crossing_the_play_is_followed_by_the_integration() -> None:
+@pytest.mark.parametrize("gradual_share", [0.0, 1.0])
+def test_crossing_the_play_is_followed_by_the_integration(gradual_share: float) -> None:
     """Upright the boom swings from flank to flank; a fourth of the step changes little."""
-    plant = _with(backlash={"gap": 2e-3})
+    plant = _with(backlash={"gap": 2e-3, "gradual_share": gradual_share})
     state = plant.initial(math.radians(90.0), 120e5)
     state[core.MODES + 5] = 5.0  # rate of the rigid mode
     runs = [plant.simulate(state, np.zeros(4000 * n), 1e-3 / n, 10 * n) for n in (1, 4)]

@@ -23,8 +23,8 @@ class Backlash(Effect):
     source: ClassVar[str] = "worn pins and bushings, 0.1-1 mm"
     trial: ClassVar[dict[str, float]] = {"gap": 5e-4, "gradual_share": 0.5}
 
-    gap: float = quantity("m", 0.0, 5e-3, "from flank to flank", default=0.0)
-    seating_force: float = quantity("N", 1e4, 1e6, "F_s, at which a flank is met", default=2e4)
+    gap: float = quantity("m", 0.0, 1e-2, "from flank to flank", default=0.0)
+    seating_force: float = quantity("N", 1e3, 1e6, "F_s, at which a flank is met", default=2e4)
     gradual_share: float = quantity("1", 0.0, 1.0, "of F/sqrt(F^2 + F_s^2)", default=0.0)
     crossing_time: float = quantity("s", 0.01, 0.5, "T, of the film in the bearing", default=0.01)
 
@@ -42,3 +42,13 @@ def rate(offset: float, force: float, p: Any) -> float:
     if p.backlash_gap == 0.0:
         return 0.0
     return (flank(force, p) - offset) / p.backlash_crossing_time
+
+
+@compiled
+def settling_rate(stiffness: float, p: Any) -> float:
+    """Return the rate, 1/s, at which play and oil settle where the force changes sign.
+
+    stiffness: of the oil against the piston's motion, N/m.
+    """
+    yielding = 0.5 * p.backlash_gap / p.backlash_seating_force  # m/N, the most there is
+    return (1.0 + yielding * stiffness) / p.backlash_crossing_time

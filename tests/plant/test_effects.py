@@ -356,6 +356,23 @@ def test_crossing_the_play_is_followed_by_the_integration(gradual_share: float) 
     assert np.abs(runs[0] - runs[1])[:, T["force"]].max() < 2e-3 * np.ptp(force)
 
 
+@pytest.mark.parametrize("gap", [1e-4, 1e-2])
+@pytest.mark.parametrize("seating_force", [1e3, 1e6])
+@pytest.mark.parametrize("crossing_time", [0.01, 0.5])
+def test_any_play_in_range_is_followed(
+    gap: float, seating_force: float, crossing_time: float
+) -> None:
+    """As by steps of 0.05 ms: the stiffest play settles within 0.03 ms."""
+    play = {"gap": gap, "seating_force": seating_force, "crossing_time": crossing_time}
+    plant = _with(backlash=play)
+    state = plant.initial(math.radians(90.0), 120e5)
+    state[core.MODES + 5] = 5.0  # rate of the rigid mode
+    runs = [plant.simulate(state, np.zeros(1000 * n), 1e-3 / n, 10 * n) for n in (1, 20)]
+    force = runs[1][:, T["force"]]
+    assert force.min() < 0.0 < force.max()
+    assert np.abs(runs[0] - runs[1])[:, T["force"]].max() < 5e-3 * np.ptp(force)
+
+
 # chambers
 
 

@@ -59,7 +59,7 @@ class _Left:
         stated = known.unknowns.toleranced
         prior = np.diag(np.where(stated, 1.0 / TOLERANCE_SPREAD, HELD))
         self._drawn = np.where(stated, known.x, 0.0) / TOLERANCE_SPREAD
-        low, high = known.unknowns.bounds
+        self._bounds = low, high = known.unknowns.bounds
         self._x, self._room = known.x, (low - known.x, high - known.x)
         steps = np.where(known.x + step > high, -step, step)
         values = missing([known, *(known.at(x) for x in known.x + np.diag(steps))])
@@ -79,7 +79,8 @@ class _Left:
         beyond = np.any((changes < self._room[0]) | (changes > self._room[1]), axis=1)
         for k in np.flatnonzero(beyond):
             changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
-        return residuals + changes @ self._triangle.T @ self._basis.T, self._x + changes
+        x = np.clip(self._x + changes, *self._bounds)  # rounding leads beyond them
+        return residuals + changes @ self._triangle.T @ self._basis.T, x
 
     def runs(self, one: Trial) -> bool:
         """Tell whether a trial's machine can rest where the recordings begin, and be simulated."""

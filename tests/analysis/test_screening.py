@@ -7,12 +7,12 @@ import pytest
 import recorded
 
 from emir_analysis.diagnosis.balances import sensed
-from emir_analysis.diagnosis.candidates import fit_balances, trial
+from emir_analysis.diagnosis.candidates import Trial, fit_balances, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.screening import screen, screen_pairs
+from emir_analysis.diagnosis.screening import _Left, screen, screen_pairs
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -41,6 +41,28 @@ def test_a_robust_fit_goes_on_after_steps_that_were_too_long() -> None:
     begin, low, high = np.array([0.2115, 1.6]), np.zeros(2), np.array([10.0, 6.3])
     found = fit(Problem(model, begin, low, high, free), 1e-3, robust=True)
     assert found.x == pytest.approx([0.214, 1.6], abs=5e-5)
+
+
+def test_parameters_that_do_their_best_stay_inside_their_bounds_to_the_last_digit() -> None:
+    """Random straight residuals whose optimum lies far off."""
+    members = unknowns(Sheet(joint1(), {}, {}, ()), ("valve_dead_zone_error", "linkage_error"))
+    low, high = members.bounds
+    random = np.random.default_rng(0)
+    size = low.size
+    on_bounds = 0
+    for _ in range(300):
+        slopes, wanted = random.normal(size=(40, size)), random.normal(0.0, 30.0, size)
+        x = random.uniform(low, high)
+        known = Trial((), members, x, np.full((size, size), np.nan))
+
+        def missing(trials: list[Trial], a: Array = slopes, b: Array = wanted) -> Array:
+            return np.array([a @ (one.x - b) for one in trials])
+
+        (best,) = _Left(known, missing, 1e-3).inside([known])[1]
+        members.at(best)  # raises outside the range
+        assert np.all((best >= low) & (best <= high))
+        on_bounds += np.count_nonzero((best == low) | (best == high))
+    assert on_bounds > 100
 
 
 def recorded_run(machine: Machine) -> Experiment:

@@ -22,6 +22,8 @@ def declared(tree: Any) -> dict[str, tuple[Quantity, Any]]:
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """Return the tree with some quantities replaced, given by dotted path.
 
+    One number of a list is given by its place behind the list's path: `curve_lifting.3`.
+
     Raises ParameterError for a path that does not exist or a value out of range.
     """
     result: Tree = _replaced(tree, values, "")
@@ -43,10 +45,26 @@ def _replaced(tree: Any, values: Mapping[str, Any], prefix: str) -> Any:
     known = {field.name for field in dataclasses.fields(tree)}
     for name, rest_of_it in branches.items():
         branch = getattr(tree, name) if name in known else None
+        if isinstance(branch, tuple):
+            new[name] = _replaced_in_list(tree, name, rest_of_it, prefix)
+            continue
         if not dataclasses.is_dataclass(branch):
             raise _unknown(tree, prefix, f"{name}.{next(iter(rest_of_it))}")
         new[name] = _replaced(branch, rest_of_it, f"{prefix}{name}.")
     return dataclasses.replace(tree, **new)
+
+
+def _replaced_in_list(
+    tree: Any, name: str, numbers: Mapping[str, Any], prefix: str
+) -> tuple[float, ...]:
+    """Return a list of numbers with some of them replaced, given by their place from 0 on."""
+    replaced = list(getattr(tree, name))
+    for place, number in numbers.items():
+        if not place.isdecimal() or int(place) >= len(replaced):
+            raise _unknown(tree, prefix, f"{name}.{place}")
+        replaced[int(place)] = number
+    quantities(tree)[name].check(prefix + name, replaced)
+    return tuple(map(float, replaced))
 
 
 def _unknown(tree: Any, prefix: str, name: str) -> ParameterError:

@@ -18,12 +18,14 @@ class Quantity:
     """What is known about a parameter beside its value.
 
     unit: SI unit, "1" when dimensionless. low, high: the closed range of admissible values.
+    count: of the numbers in a list; 0 for a single one.
     """
 
     unit: str
     low: float
     high: float
     meaning: str
+    count: int = 0
 
     @property
     def allowed(self) -> str:
@@ -31,24 +33,41 @@ class Quantity:
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.low:g} ... {self.high:g}{unit}"
 
-    def check(self, name: str, value: float) -> None:
-        """Raise ParameterError unless `value` is a finite number inside the range."""
+    def check(self, name: str, value: Any) -> None:
+        """Raise ParameterError unless `value` is a finite number, or all are, inside the range."""
+        if self.count:
+            self._check_each(name, value)
+        else:
+            self._check_number(name, value)
+
+    def _check_each(self, name: str, values: Any) -> None:
+        if not isinstance(values, list | tuple) or len(values) != self.count:
+            raise ParameterError(f"{name} = {values!r}: not a list of {self.count} numbers")
+        for k, value in enumerate(values):
+            self._check_number(f"{name}.{k}", value)
+
+    def _check_number(self, name: str, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{name} = {value!r}: not a number")
         if not math.isfinite(value) or not self.low <= value <= self.high:
             raise ParameterError(f"{name} = {value:g}: outside {self.allowed}")
 
 
-def quantity(
+def quantity(  # noqa: PLR0913 - all that is to be said of a parameter
     unit: str,
     low: float,
     high: float,
     meaning: str,
     default: Any = dataclasses.MISSING,
+    *,
+    count: int = 0,
 ) -> Any:
-    """Declare a field of a parameter dataclass, with its unit, range and meaning."""
+    """Declare a field of a parameter dataclass, with its unit, range and meaning.
+
+    count: of the numbers in it where it is a list, which a tuple holds.
+    """
     return dataclasses.field(
-        default=default, metadata={"quantity": Quantity(unit, low, high, meaning)}
+        default=default, metadata={"quantity": Quantity(unit, low, high, meaning, count)}
     )
 
 

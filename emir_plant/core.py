@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import dry_friction
+from emir_plant import dry_friction, unnamed_force
 from emir_plant.effects import (
     backlash,
     command_delay,
@@ -103,6 +103,11 @@ def _motion(x: Array, p: Any) -> _Motion:
 
 
 @compiled_in_place
+def _situation(motion: _Motion) -> terms.Situation:
+    return terms.Situation(motion.force, motion.stroke)
+
+
+@compiled_in_place
 def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
     """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
     edges = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
@@ -133,7 +138,7 @@ def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Arr
 def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
     """As `write_derivative`, with the parameters of one machine."""
     motion = _motion(x, p)
-    dry = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    dry = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     _write_rates(x, command, motion, dry, p, dx)
 
 
@@ -183,7 +188,8 @@ def _write_lags(x: Array, motion: _Motion, p: Any, dx: Array) -> None:
 def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> None:
     n = p.mode_joint.size
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
-    torque = (motion.force - friction) * motion.arm
+    unnamed = unnamed_force.along(motion.joint_velocity, motion.stroke, p)
+    torque = (motion.force + unnamed - friction) * motion.arm
     gravity = math.cos(motion.angle)
     load = external_load.force(x[TIME], p)
     for i in range(n):
@@ -336,12 +342,12 @@ def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
     for i in range(n):
         turning += p.mode_joint[i] * dx[MODES + n + i]
         admittance += p.mode_joint[i] * p.mode_joint[i]
-    friction = terms.dry_friction(motion.joint_velocity, motion.force, p)
+    friction = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     piston = dry_friction.Piston(
         motion.joint_velocity,
         motion.arm * turning,
         motion.arm * motion.arm * admittance,
-        motion.force,
+        _situation(motion),
         friction,
         _swing(x, dx, motion.arm, friction, p),
     )
@@ -374,7 +380,7 @@ def _write_later_rates(
     motion = _motion(x, p)
     force = dry.force
     if not dry.held:
-        force = terms.dry_friction(motion.joint_velocity, motion.force, p)
+        force = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     _write_rates(x, command, motion, force, p, dx)
 
 

@@ -35,7 +35,7 @@ class Piston(NamedTuple):
     velocity: float  # m/s
     acceleration: float  # without dry friction, m/s^2
     mobility: float  # 1/kg
-    load: float  # force of the oil, N
+    at: terms.Situation
     friction: float  # dry, N
     swing: float  # amplitude in the boom's fastest mode, m/s
 
@@ -72,18 +72,18 @@ def over_step(piston: Piston, left: float, usual: float, fine: float, p: Any) ->
     while True:
         unhindered, mobility = piston.velocity + step * piston.acceleration, step * piston.mobility
         straight = unhindered - mobility * piston.friction
-        change = mobility * abs(terms.dry_friction(straight, piston.load, p) - piston.friction)
+        change = mobility * abs(terms.dry_friction(straight, piston.at, p) - piston.friction)
         if change <= GENTLE * abs(straight - piston.velocity):
             return Friction(step, piston.friction, False)
         if step <= SHORTEST * fine:
-            return Friction(step, at_end(unhindered, mobility, piston.load, p), True)
+            return Friction(step, at_end(unhindered, mobility, piston.at, p), True)
         # a friction that changes by no more leads to a velocity between these two
         low, high = straight - allowed, straight + allowed
-        at_low = _off(low, unhindered, mobility, piston.load, p)
-        at_high = _off(high, unhindered, mobility, piston.load, p)
+        at_low = _off(low, unhindered, mobility, piston.at, p)
+        at_high = _off(high, unhindered, mobility, piston.at, p)
         if at_low <= 0.0 <= at_high:
             ends = Ends(low, at_low, high, at_high)
-            return Friction(step, _between(ends, unhindered, mobility, piston.load, p), True)
+            return Friction(step, _between(ends, unhindered, mobility, piston.at, p), True)
         step *= 0.5
 
 
@@ -93,32 +93,32 @@ def _following(piston: Piston, usual: float, fine: float, p: Any) -> float:
     if piston.swing <= SWING:
         return usual
     slowest = piston.velocity - math.copysign(piston.swing, piston.velocity)
-    change = terms.dry_friction(slowest, piston.load, p) - piston.friction
+    change = terms.dry_friction(slowest, piston.at, p) - piston.friction
     if piston.mobility * abs(change) > CHANGE:
         return fine
     return min(EVEN * fine, usual)
 
 
 @compiled
-def at_end(unhindered: float, mobility: float, load: float, p: Any) -> float:
+def at_end(unhindered: float, mobility: float, at: terms.Situation, p: Any) -> float:
     """Return the dry friction, N, at the end of a step.
 
     unhindered: velocity at the end of the step without it, m/s. mobility: step over mass,
-    m/(s N). load: force of the oil on the piston, N. The velocity lies between 0 and unhindered.
+    m/(s N). The velocity lies between 0 and unhindered.
     """
-    at_high = mobility * terms.dry_friction(unhindered, load, p)
+    at_high = mobility * terms.dry_friction(unhindered, at, p)
     ends = Ends(0.0, -unhindered, unhindered, at_high)
-    return _between(ends, unhindered, mobility, load, p)
+    return _between(ends, unhindered, mobility, at, p)
 
 
 @compiled
-def _off(velocity: float, unhindered: float, mobility: float, load: float, p: Any) -> float:
+def _off(velocity: float, unhindered: float, mobility: float, at: terms.Situation, p: Any) -> float:
     """Return by how much, m/s, the velocity at a step's end is not what its friction makes it."""
-    return velocity + mobility * terms.dry_friction(velocity, load, p) - unhindered
+    return velocity + mobility * terms.dry_friction(velocity, at, p) - unhindered
 
 
 @compiled
-def _between(ends: Ends, unhindered: float, mobility: float, load: float, p: Any) -> float:
+def _between(ends: Ends, unhindered: float, mobility: float, at: terms.Situation, p: Any) -> float:
     """Return the dry friction, N, at the end of a step; the velocity lies between two ends.
 
     By the Illinois method.
@@ -129,7 +129,7 @@ def _between(ends: Ends, unhindered: float, mobility: float, load: float, p: Any
         if at_high == at_low:
             break
         velocity = (low * at_high - high * at_low) / (at_high - at_low)
-        off = _off(velocity, unhindered, mobility, load, p)
+        off = _off(velocity, unhindered, mobility, at, p)
         if abs(off) <= TOLERANCE:
             break
         if off * at_high > 0.0:

@@ -10,6 +10,7 @@ from typing import Any
 
 from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
+from emir_plant.unnamed_force import UnnamedForce
 
 GRAVITY = 9.81  # m/s^2
 RATED_PAYLOAD = 1500.0  # kg, paper 1
@@ -129,6 +130,7 @@ class Machine:
     resistances: Resistances
     logic_block: LogicBlock
     sensors: Sensors
+    unnamed_force: UnnamedForce = UnnamedForce()
     effects: Effects = field(default_factory=Effects)
 
     def __post_init__(self) -> None:

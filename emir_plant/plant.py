@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core, linkage
+from emir_plant import core, linkage, unnamed_force
 from emir_plant.core import Array, Truth
 from emir_plant.effects import backlash, command_delay, external_load, linkage_error
 from emir_plant.hydraulics import logic_block
@@ -60,6 +60,7 @@ class Plant:
         load = p["mode_weight"] * math.cos(angle) - p["mode_tip"] * external_load.force(0.0, p)
         torque = load[0] / p["mode_joint"][0]
         force = torque / linkage_error.lever_arm(angle, p)
+        force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)
         high = (force + low * p["area_lowering"]) / p["area_lifting"]
         if not 0.0 <= high <= p["p0"]:
             raise SimulationError(

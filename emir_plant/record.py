@@ -12,11 +12,17 @@ from emir_plant.boom import BoomModes, boom_modes
 from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine, groups
+from emir_plant.unnamed_force import POINTS, UnnamedForce
 
-EFFECT_FIELDS = tuple(
-    f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)
+EFFECT_FIELDS = (
+    *(f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)),
+    *(name for name, about in quantities(UnnamedForce).items() if not about.count),
 )
-EFFECT_SIZES = tuple(f"{effect}_{size}" for effect, kind in REGISTRY.items() for size in kind.sizes)
+LISTS = tuple(name for name, about in quantities(UnnamedForce).items() if about.count)
+EFFECT_SIZES = (
+    *(f"{effect}_{size}" for effect, kind in REGISTRY.items() for size in kind.sizes),
+    "curve_over",
+)
 
 
 def record(machine: Machine) -> NDArray[Any]:
@@ -38,8 +44,11 @@ def record(machine: Machine) -> NDArray[Any]:
 
 @cache
 def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
-    """Return the record's layout: modal quantities are arrays over the modes, others scalars."""
-    return np.dtype([(n, np.float64, (modes,) if n.startswith("mode_") else ()) for n in names])
+    """Return the record's layout: modal quantities are arrays over the modes, curves lists."""
+    shapes = dict.fromkeys(LISTS, (POINTS,))
+    return np.dtype(
+        [(n, np.float64, (modes,) if n.startswith("mode_") else shapes.get(n, ())) for n in names]
+    )
 
 
 def _with_effects(machine: Machine) -> Geometry:
@@ -49,11 +58,11 @@ def _with_effects(machine: Machine) -> Geometry:
 
 
 def _parameters(machine: Machine) -> dict[str, Any]:
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for path, group in groups(machine).items():
         kind, _, effect = path.partition(".")
         prefix = f"{effect}_" if kind == "effects" else ""
-        values |= {prefix + name: float(getattr(group, name)) for name in quantities(group)}
+        values |= {prefix + name: getattr(group, name) for name in quantities(group)}
     return values
 
 

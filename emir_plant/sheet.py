@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from emir_common.quantity import ParameterError, quantities
+from emir_common.quantity import ParameterError, Quantity, quantities
 from emir_common.yaml_file import read_map
 from emir_plant.effects import REGISTRY, Effects
 from emir_plant.parameters import Machine
@@ -107,7 +107,7 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
     for path in [*wrong, *(headings if strict else [])]:
         raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for path, about in known.items():
         entry = entries.get(path)
         if entry is None:
@@ -117,7 +117,7 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         misspelt = [key for key in entry if str(key).startswith("tol") and key != "tol"]
         if misspelt:
             raise ParameterError(f"{path}: {misspelt[0]}: a tolerance is given as tol")
-        values[path] = _number(entry.get("value", 1.0), path)
+        values[path] = _value(entry.get("value", 1.0), path, about)
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
     effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
     stated = {path: entries[path] for path in values}
@@ -166,6 +166,13 @@ def _groups(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return others | {EFFECTS + name: members for name, members in effects.items()}
 
 
+def _value(value: Any, path: str, about: Quantity) -> Any:
+    if not about.count:
+        return _number(value, path)
+    about.check(path, value)
+    return tuple(map(float, value))
+
+
 def _number(value: Any, path: str) -> float:
     # YAML reads 1e-12 (no dot) as text, a trap worth stepping around
     try:
@@ -196,7 +203,7 @@ def _entries(members: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _group(kind: type[Any], name: str, values: dict[str, float]) -> Any:
+def _group(kind: type[Any], name: str, values: dict[str, Any]) -> Any:
     fields = dataclasses.fields(kind)
     given = {f.name: values[f"{name}.{f.name}"] for f in fields if f"{name}.{f.name}" in values}
     for f in fields:

@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from emir_analysis.recorded_parameters import OF_A_TOPIC, OF_EVERY_NODE
 from emir_analysis.robot_setup import Posture, path_parameters, trajectory
 from emir_analysis.switching import Selector, Switch
 from emir_common.parameter_tree import declared, with_values
@@ -35,7 +36,7 @@ NODES = tuple(dict.fromkeys(  # each once
 ))  # fmt: skip
 EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
-OF_EVERY_NODE = ("trajectory", "lockstep", "model", "input_timeout", "standby", "autostart")
+OF_THE_NODE = ("trajectory", *OF_EVERY_NODE)  # of trajectory_node, but not of its trajectory
 ROBOT_FILES = ("robot_file", "machine_file")
 ROBOT_CONTROLLERS = ("cascade", "pfc")
 
@@ -120,7 +121,12 @@ def _check_model(plan: Plan) -> None:
 def duration(plan: Plan) -> float:
     """Return how long the run takes, s. Raises ParameterError for a trajectory that cannot be."""
     given = read_parameters(plan.params)
-    own = {k: v for k, v in given.get("trajectory_node", {}).items() if k not in OF_EVERY_NODE}
+    given_to_node = given.get("trajectory_node", {})
+    own = {
+        name: value
+        for name, value in given_to_node.items()
+        if name not in OF_THE_NODE and not name.startswith(OF_A_TOPIC)
+    }
     where = f"{plan.params}: trajectory_node: " if own else ""
     try:
         if plan.model == ROBOT:

@@ -1,6 +1,7 @@
 """ROS parameters derived from parameter dataclasses, so that each is declared once."""
 
 import math
+from array import array
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -99,6 +100,8 @@ def declare(node: Node, name: str, default: Any, description: str, *, fixed: boo
         raise ParameterError(f"{node.get_name()}: {name}: {error}") from None
     if isinstance(default, float) and type(value) is int:
         value = float(value)
+    if isinstance(default, tuple) and isinstance(value, list | array):
+        value = tuple(value)
     if type(value) is not type(default):
         kind = type(default).__name__
         raise ParameterError(f"{node.get_name()}: {name} = {value!r}: not of type {kind}")

@@ -95,6 +95,11 @@ class Evidence:
         """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
         return np.concatenate([balances.one_step(machine) for balances in self._balances])
 
+    @property
+    def fastest(self) -> float:
+        """The piston's greatest speed, m/s."""
+        return max(float(np.abs(balances.velocity).max()) for balances in self._balances)
+
     def check_like(self, other: "Evidence") -> None:
         """Raise InputError where these recordings lack a signal that others have."""
         lacking = sorted(other.measured - self.measured)

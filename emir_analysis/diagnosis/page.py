@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
     SHOWN,
     balances_picture,
+    curve_picture,
     free_runs_picture,
     shape_picture,
 )
@@ -141,6 +142,9 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
                 f"({100 * shape.share:.0f} % of the variance in parts left out).",
             )
         )
+    if result.curve is not None:
+        caption = "The force that has no name as a curve in the machine, fitted to the free run."
+        blocks.append(Picture(curve_picture(result.curve), caption))
     return blocks
 
 

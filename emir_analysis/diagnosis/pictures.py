@@ -1,5 +1,6 @@
 """The pictures of a diagnosis."""
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -7,6 +8,7 @@ from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
+from emir_analysis.diagnosis.unnamed import Curve
 from emir_analysis.report import new_figure
 
 MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"
@@ -25,6 +27,15 @@ SHOWN = {
     "bending": ("bending, mrad", 1e3),
 }
 
+# what a residual is drawn against, likewise
+AGAINST = {
+    "piston_velocity": ("piston velocity, mm/s", 1e3),
+    "piston_stroke": ("piston stroke, mm", 1e3),
+    "pressure_lifting": ("p_H, bar", 1e-5),
+    "pressure_lowering": ("p_S, bar", 1e-5),
+    "time": ("time, s", 1.0),
+}
+
 
 def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
     """Show each measured signal and its simulations, and the errors beside it.
@@ -36,8 +47,8 @@ def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
     figure = new_figure(0.6 + 1.9 * len(rows))
     axes = figure.subplots(len(rows), 2, sharex=True, width_ratios=(3, 2), squeeze=False)
     stages = {"nominal": ("data sheet", NOMINAL), "refitted": ("re-fitted", REFITTED)}
-    if findings.chosen.effects:
-        stages["with_effect"] = ("with effect", FINAL)
+    if findings.chosen is not findings.refitted:
+        stages["with_effect"] = (_added(findings), FINAL)
     for (signal, beside), row in zip(axes, rows, strict=True):
         label, factor = SHOWN[list(OUTPUTS)[row]]
         for stage, (name, colour) in stages.items():
@@ -63,8 +74,8 @@ def balances_picture(findings: Findings) -> Figure:
     figure = new_figure(0.5 + 1.5 * max(1, len(shown)))
     axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     stages = {"before": ("data sheet", NOMINAL), "refitted": ("re-fitted", REFITTED)}
-    if findings.chosen.effects:
-        stages["after"] = (findings.chosen.name, FINAL)
+    if findings.chosen is not findings.refitted:
+        stages["after"] = (_added(findings), FINAL)
     for ax, (k, name) in zip(axes, shown, strict=True):
         label, factor = SHOWN[name]
         band = 2.0 * factor * findings.floor[k]
@@ -87,14 +98,7 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
     label, factor = SHOWN.get(name, (name, 1.0))
     means = {key: values for key, (_, values) in findings.evidence.signals().items()}
     velocity = means["piston_velocity"]
-    against = {
-        "piston_velocity": ("piston velocity, mm/s", 1e3),
-        "piston_stroke": ("piston stroke, mm", 1e3),
-        "pressure_lifting": ("p_H, bar", 1e-5),
-        "pressure_lowering": ("p_S, bar", 1e-5),
-        "time": ("time, s", 1.0),
-    }
-    signals = {text: scale * means[key] for key, (text, scale) in against.items() if key in means}
+    signals = {text: scale * means[key] for key, (text, scale) in AGAINST.items() if key in means}
     figure = new_figure(2.8)
     axes = figure.subplots(1, len(signals), sharey=True)
     for ax, (text, values) in zip(axes, signals.items(), strict=True):
@@ -110,6 +114,29 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
     axes[0].set_ylabel(f"missing {label}")
     axes[0].legend(fontsize=8, loc="best")
     return figure, name
+
+
+def curve_picture(curve: Curve) -> Figure:
+    """Show a force that has no name over the signal that it depends on."""
+    label, factor = SHOWN["force"]
+    text, scale = AGAINST[curve.over]
+    figure = new_figure(2.8)
+    ax = figure.subplots()
+    parts = {"whatever the direction": curve.along, "against the motion": curve.friction}
+    for (name, points), colour in zip(parts.items(), (LOWERING, LIFTING), strict=True):
+        if any(points):
+            at, force = scale * np.array(curve.signal), factor * np.array(points)
+            ax.plot(at, force, ".-", ms=4, lw=1.0, color=colour, label=name)
+    ax.set_xlabel(text)
+    ax.set_ylabel(label)
+    ax.legend(fontsize=8, loc="best")
+    _tidy(ax)
+    return figure
+
+
+def _added(findings: Findings) -> str:
+    """Return what the final machine has more than the re-fitted one."""
+    return findings.chosen.name if findings.curve is None else "with the curve"
 
 
 def _tidy(*axes: Axes) -> None:

@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.statistics import (
     whiteness,
 )
 from emir_analysis.diagnosis.telling import untold
+from emir_analysis.diagnosis.unnamed import Curve
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
@@ -86,7 +87,7 @@ class BalanceResult:
 
 @dataclass(frozen=True)
 class SignalResult:
-    """RMS error of a model by stage; with_effect equals refitted where no effect is named."""
+    """RMS error of a model by stage; with_effect equals refitted where nothing is added to it."""
 
     unit: str
     noise: float
@@ -120,8 +121,9 @@ class Diagnosis:
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
     stays unexplained. at_end: parameters that were led to the end of what data sheet and registry
-    allow. untold: what missing sensors leave open, by balance. control: a controller
-    designed before and after, on the machine as found, where that was asked for.
+    allow. curve: a force that has no name, which `with_effect` then has. untold: what missing
+    sensors leave open, by balance. control: a controller designed before and after, on the
+    machine as found, where that was asked for.
     """
 
     verdict: str
@@ -137,6 +139,7 @@ class Diagnosis:
     tests: dict[str, ErrorTests]
     parameters: dict[str, ParameterResult]
     shape: Shape | None
+    curve: Curve | None
     at_end: tuple[str, ...]
     untold: dict[str, str]
     control: dict[str, ControlResult]
@@ -166,6 +169,7 @@ def diagnosis(
         tests=_tests(judged, whole, period),
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
+        curve=findings.curve,
         at_end=at_end(findings),
         untold=untold(findings.evidence),
         control=control or {},
@@ -193,6 +197,7 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
     members = trial.unknowns.members
     spread = trial.spread
     together = confounded([member.path for member in members], trial.covariance)
+    together = {path: _without_points(others) for path, others in together.items()}
     result = {}
     for k, (unknown, x) in enumerate(zip(members, trial.x, strict=True)):
         low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
@@ -200,6 +205,11 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
         with_it = together[unknown.path]
         result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
     return result
+
+
+def _without_points(paths: Sequence[str]) -> tuple[str, ...]:
+    """Return what is named among parameters: of a curve's points nobody would read a list."""
+    return tuple(path for path in paths if not path.startswith("unnamed_force."))
 
 
 def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, ...]]:

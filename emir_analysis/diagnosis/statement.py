@@ -3,16 +3,20 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, STROKE, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.telling import movement
+from emir_analysis.diagnosis.unnamed import Curve
 
 MANY = 0.1  # share of the samples
+BEYOND = 0.01  # share of the judge recordings
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
@@ -36,7 +40,8 @@ def _of_findings(findings: Findings) -> str:
     remainder = ""
     if speaking is not None and shape is not None:
         column = list(BALANCES).index(speaking)
-        size = level(findings.residuals["after"])[column]
+        stage = "refitted" if findings.verdict == "unexplained" else "after"
+        size = level(findings.residuals[stage])[column]
         noise_share = size / findings.floor[column]
         remainder = (
             f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
@@ -90,11 +95,35 @@ def _surprised(findings: Findings, judged: Judged) -> bool:
 
 
 def _judgement(findings: Findings, judged: Judged) -> str:
+    if findings.curve is not None:
+        return _measured(findings.curve, judged)
     if findings.verdict == "unexplained" or not _surprised(findings, judged):
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
     return f"; but {judge}, {by}, shows more: diagnose from that too"
+
+
+def _measured(curve: Curve, judged: Judged) -> str:
+    parts = {"whatever the direction": curve.along, "against the motion": curve.friction}
+    most = {text: max(map(abs, points)) for text, points in parts.items()}
+    forces = " and ".join(f"up to {size:.3g} N {text}" for text, size in most.items() if size)
+    return (
+        f"; with that measured as a curve over {curve.over}, {forces}, the free run of"
+        f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
+        f"{_beyond(curve, judged)}"
+    )
+
+
+def _beyond(curve: Curve, judged: Judged) -> str:
+    """Return that the judge recordings go where nothing was measured, if they do."""
+    if curve.over != STROKE:
+        return ""
+    strokes = np.concatenate([e.outputs[:, 0] for e in judged.evidence.experiments])
+    outside = np.mean((strokes < curve.signal[0]) | (strokes > curve.signal[-1]))
+    if outside < BEYOND:
+        return ""
+    return f", of which {100 * outside:.0f} % lie beyond the strokes it was measured at"
 
 
 def _described(shape: Shape) -> str:

@@ -1,10 +1,11 @@
 """The effects' terms, summed for each balance of the compiled core."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_plant import unnamed_force
 from emir_plant.effects import (
     backlash,
     coulomb_friction,
@@ -24,6 +25,13 @@ from emir_plant.jit import compiled
 Array = NDArray[np.float64]
 
 
+class Situation(NamedTuple):
+    """What dry friction depends on beside the piston's velocity."""
+
+    load: float  # force of the oil on the piston, N
+    stroke: float  # of the piston, m
+
+
 @compiled
 def strokes(angles: Array, forces: Array, p: Any) -> Array:
     """Return the piston's strokes, (n,) m, at boom angles, (n,) rad.
@@ -40,13 +48,19 @@ def strokes(angles: Array, forces: Array, p: Any) -> Array:
 def friction(velocity: float, load: float, p: Any) -> float:
     """Return the force against the piston's motion, N, at its velocity, m/s.
 
-    load: force of the oil on the piston, N.
+    load: force of the oil on the piston, N. Without a friction that depends on the stroke.
     """
-    return dry_friction(velocity, load, p) + viscous_friction.friction(velocity, p)
+    return named_dry_friction(velocity, load, p) + viscous_friction.friction(velocity, p)
 
 
 @compiled
-def dry_friction(velocity: float, load: float, p: Any) -> float:
+def dry_friction(velocity: float, at: Situation, p: Any) -> float:
+    """Return all friction that is steep near standstill, N, at the piston's velocity, m/s."""
+    return named_dry_friction(velocity, at.load, p) + unnamed_force.friction(velocity, at.stroke, p)
+
+
+@compiled
+def named_dry_friction(velocity: float, load: float, p: Any) -> float:
     """Return the part of `friction` that is steep near standstill, N."""
     dry = coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
     return dry + pressure_dependent_friction.friction(velocity, load, p)
@@ -56,7 +70,7 @@ def dry_friction(velocity: float, load: float, p: Any) -> float:
 def has_dry_friction(p: Any) -> bool:
     """Tell whether the machine has any of it."""
     force = p.coulomb_friction_force + p.stribeck_friction_force
-    return force + p.pressure_dependent_friction_coefficient > 0.0
+    return force + p.pressure_dependent_friction_coefficient + p.curve_over > 0.0
 
 
 @compiled

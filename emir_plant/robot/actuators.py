@@ -26,6 +26,7 @@ from emir_plant.parameters import Machine
 from emir_plant.record import record
 from emir_plant.robot.parameters import Joint, Robot
 from emir_plant.robot.reach import Reach
+from emir_plant.unnamed_force import NOTHING
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,8 @@ def machines(robot: Robot, reaches: tuple[Reach, ...]) -> tuple[Machine, ...]:
     ParameterError for an effect that is switched on and has no place here.
     """
     _check_effects(robot.main.effects, EFFECTS, "")
+    if robot.main.unnamed_force.curve_over != NOTHING:
+        raise ParameterError("unnamed_force: not in the model of the whole robot")
     for name, effects in robot.effects.items():
         _check_effects(effects, tuple(e for e in EFFECTS if e != "payload"), f"{name}.")
     others = (

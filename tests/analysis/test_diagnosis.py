@@ -13,6 +13,7 @@ from emir_analysis import bags
 from emir_analysis.diagnosis import Diagnosis, command, summary
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.recording_checks import check_readings
+from emir_analysis.diagnosis.select import AT_NOISE, EXPLAINED
 from emir_analysis.diagnosis.unknowns import unknowns, with_values
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Signal
@@ -158,14 +159,25 @@ def test_an_effect_outside_the_registry_is_called_unexplained(
     def tight_spot(stroke: float, velocity: float) -> float:
         return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
 
-    recorded.record_machine(tmp_path / "a", built, DURATION, 3, tight_spot)
-    result = diagnose(folder, tmp_path / "a")
+    # the second stays where the first was: between 0.49 and 0.58 m of stroke, and 0.46 and 0.59 m
+    recorded.record_machine(tmp_path / "a", built, DURATION, 6, tight_spot)
+    recorded.record_machine(tmp_path / "b", built, DURATION, 4, tight_spot)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
     assert result.verdict == "unexplained", summary(result)
     assert result.effects == ()
     assert "balance force" in result.statement
-    assert result.balances["force"].after > 10.0 * result.balances["force"].noise
+    assert result.balances["force"].refitted > 10.0 * result.balances["force"].noise
     quiet = result.balances["lifting_chamber"]
     assert quiet.after < 1.5 * quiet.noise
+    # it has no name, but a curve, with which the machine can be foreseen
+    assert result.curve is not None
+    assert result.curve.over == "piston_stroke"
+    assert not any(result.curve.along)
+    law = [tight_spot(stroke, 1.0) for stroke in result.curve.signal]
+    assert result.curve.friction == pytest.approx(law, abs=0.05 * 40e3)
+    for name, signal in result.signals.items():
+        assert signal.refitted > EXPLAINED * signal.noise, name
+        assert signal.with_effect < AT_NOISE * signal.noise, name
 
 
 def test_what_the_judge_recording_alone_shows_is_not_called_nothing(

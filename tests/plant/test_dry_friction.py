@@ -16,6 +16,7 @@ from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
 FORTY_FIVE = math.radians(45.0)
+UNDER_LOAD = terms.Situation(6e5, 0.5)
 STROKE = Truth._fields.index("stroke")
 
 
@@ -30,7 +31,7 @@ def _with_friction(force: float, smoothing_speed: float) -> Plant:
 @pytest.mark.parametrize("unhindered", [1e-6, 1e-3, 0.05, -1e-6, -0.05])
 def test_friction_of_a_step_belongs_to_the_velocity_at_its_end(unhindered: float) -> None:
     p, mobility = _with_friction(2e4, 1e-4).record[0], 2e-7
-    friction = dry_friction.at_end(unhindered, mobility, 6e5, p)
+    friction = dry_friction.at_end(unhindered, mobility, UNDER_LOAD, p)
     end = unhindered - mobility * friction
     assert abs(mobility * (friction - 2e4 * math.tanh(end / 1e-4))) <= 1e-9  # m/s
     assert end * unhindered >= 0.0  # it stops a motion, it does not turn it round
@@ -96,8 +97,8 @@ def _piston(
     p: Any, velocity: float, acceleration: float, weight: float, swing: float = 0.0
 ) -> dry_friction.Piston:
     """Return a piston under 600 kN; weight: 1/kg, swing: m/s."""
-    friction = terms.dry_friction(velocity, 6e5, p)
-    return dry_friction.Piston(velocity, acceleration, weight, 6e5, friction, swing)
+    friction = terms.dry_friction(velocity, UNDER_LOAD, p)
+    return dry_friction.Piston(velocity, acceleration, weight, UNDER_LOAD, friction, swing)
 
 
 def test_a_step_is_short_only_where_friction_turns_round() -> None:
@@ -128,20 +129,20 @@ def test_friction_changes_by_no_more_than_a_step_allows() -> None:
     held = {True: 0, False: 0}
     for _ in range(2000):
         velocity = random.normal(0.0, 1e-3)
-        nearly_held = weight * terms.dry_friction(velocity, 6e5, p)
+        nearly_held = weight * terms.dry_friction(velocity, UNDER_LOAD, p)
         acceleration = nearly_held + random.normal(0.0, 1.0)
         piston = _piston(p, velocity, acceleration, weight)
         step, force, whole = dry_friction.over_step(piston, usual, usual, fine, p)
         if not whole:
             continue
         end = velocity + step * (acceleration - weight * force)
-        assert step * weight * abs(force - terms.dry_friction(end, 6e5, p)) <= 1e-9  # m/s
+        assert step * weight * abs(force - terms.dry_friction(end, UNDER_LOAD, p)) <= 1e-9  # m/s
         change = step * weight * abs(force - piston.friction)
         held[step > shortest] += 1
         assert step == shortest or change <= 1.001 * dry_friction.CHANGE * fine
         if step < usual:  # and the step twice as long would have changed it by more
             after = dry_friction.at_end(
-                velocity + 2.0 * step * acceleration, 2.0 * step * weight, 6e5, p
+                velocity + 2.0 * step * acceleration, 2.0 * step * weight, UNDER_LOAD, p
             )
             assert 2.0 * step * weight * abs(after - piston.friction) > dry_friction.CHANGE * fine
     assert min(held.values()) > 100  # both were met

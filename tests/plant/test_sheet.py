@@ -16,7 +16,8 @@ FILE = Path(__file__).parents[2] / "emir_plant" / "data" / "joint1.yaml"
 
 def test_every_number_of_the_machine_has_a_source() -> None:
     sheet = load_sheet(FILE, strict=True)
-    own = {path for path in declared(sheet.machine) if not path.startswith("effects.")}
+    beside = ("effects.", "unnamed_force.")  # off unless somebody finds or measures them
+    own = {path for path in declared(sheet.machine) if not path.startswith(beside)}
     assert sheet.sources.keys() == own
     assert sheet.machine == joint1()
 

@@ -55,6 +55,7 @@ from emir_msgs_py.topics import (
 )
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
+from emir_plant.unnamed_force import POINTS
 from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.run import main as run_graph
 
@@ -404,9 +405,11 @@ def test_a_recording_is_never_overwritten(
 def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) -> None:
     """Parameters as set and as left alone, and what every field means."""
     file, bag = tmp_path / "params.yaml", tmp_path / "run"
+    curve = [1e3 * k for k in range(POINTS)]
     file.write_text(
         "cascade_node: {ros__parameters: {gain: 1.5}}\n"
-        "plant_node: {ros__parameters: {effects.payload.mass: 500.0, sensors.seed: 7}}\n"
+        "plant_node: {ros__parameters: {effects.payload.mass: 500.0, sensors.seed: 7,\n"
+        f"  unnamed_force: {{curve_over: 1, curve_friction: {curve}}}}}}}\n"
     )
     words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(bag)]) == 0
@@ -419,8 +422,10 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     assert parameters["cascade_node"]["gain"] == 1.5
     assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
     assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
-    assert stored["emir.machine"] == {"effects": "payload mass = 500 kg", "seed": "7"}
-    assert {"effects: payload mass = 500 kg", "seed: 7"} <= set(text(info(bag)).splitlines())
+    assert parameters["plant_node"]["unnamed_force.curve_friction"] == curve
+    effects = "payload mass = 500 kg; unnamed_force over the stroke up to 3.2e+04 N"
+    assert stored["emir.machine"] == {"effects": effects, "seed": "7"}
+    assert {f"effects: {effects}", "seed: 7"} <= set(text(info(bag)).splitlines())
     for channel in summary.channels.values():
         if channel.topic == DIAGNOSTICS:
             continue
@@ -432,7 +437,10 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
         assert all(entry["meaning"] for entry in fields.values())
     again = tmp_path / "again.yaml"
     again.write_text(parameters_text(info(bag)))
-    assert read_parameters(again) == parameters  # the file sets up the same run
+    assert read_parameters(again) == parameters
+    words = ["--params", str(again), "--processes", processes, "--duration", "0.5"]
+    assert run_graph([*words, "--bag", str(tmp_path / "again")]) == 0  # it sets up the same run
+    assert _raw(tmp_path / "again") == _raw(bag)
 
 
 def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
-from emir_plant.unnamed_force import NOTHING, STROKE, VELOCITY
+from emir_plant.unnamed import UNNAMED
 
 PLANT = "plant_node"
 SEED = "sensors.seed"
@@ -13,6 +13,8 @@ SEED = "sensors.seed"
 
 def machine_record(parameters: Mapping[str, Any]) -> dict[str, str]:
     """Return the effects that are on, with their sizes, and the seed of the sensors' noise.
+
+    And which curves of what has no name.
 
     parameters: of plant_node, by dotted name. Empty for a machine that is not ours.
     """
@@ -23,19 +25,8 @@ def machine_record(parameters: Mapping[str, Any]) -> dict[str, str]:
         for name, kind in REGISTRY.items()
         if any(parameters.get(f"effects.{name}.{size}") for size in kind.sizes)
     ]
-    told += _unnamed(parameters)
+    told += [name for name in UNNAMED if parameters.get(f"{name}.over")]
     return {"effects": "; ".join(told) or "none", "seed": str(parameters[SEED])}
-
-
-def _unnamed(parameters: Mapping[str, Any]) -> list[str]:
-    """Return what is told of a force that has no name, if there is one."""
-    over = parameters.get("unnamed_force.curve_over", NOTHING)
-    if over == NOTHING:
-        return []
-    signal = {STROKE: "the stroke", VELOCITY: "the piston's velocity"}[over]
-    curves = (parameters[f"unnamed_force.curve_{form}"] for form in ("along", "friction"))
-    most = max(abs(force) for curve in curves for force in curve)
-    return [f"unnamed_force over {signal} up to {most:.3g} N"]
 
 
 def _sizes(name: str, parameters: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import dry_friction, unnamed_force
+from emir_plant import dry_friction
 from emir_plant.effects import (
     backlash,
     command_delay,
@@ -27,6 +27,7 @@ from emir_plant.effects import (
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
+from emir_plant.unnamed import force as unnamed_force
 
 Array = NDArray[np.float64]
 
@@ -108,10 +109,13 @@ def _situation(motion: _Motion) -> terms.Situation:
 
 
 @compiled_in_place
-def _valve_flows(x: Array, p: Any) -> tuple[float, float, float]:
-    """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
+def _valve_flows(x: Array, stroke: float, p: Any) -> tuple[float, float, float]:
+    """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s.
+
+    stroke: of the piston, m.
+    """
     edges = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
-    opening = terms.opening(valve.opening(edges, p), x[TIME], p)
+    opening = terms.opening(valve.opening(edges, p), x[TIME], stroke, p)
     pressures = Pressures(p.p0 - x[DROOP], x[P_H], x[P_S])
     lifting, lowering = flows(opening, pressures, x[LOGIC], p)
     return lifting, lowering, delivered(opening, lifting, lowering)
@@ -147,7 +151,7 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     x: Array, command: float, motion: _Motion, dry: float, p: Any, dx: Array
 ) -> None:
     """Write dx/dt under a given dry friction, N."""
-    flow_lifting, flow_lowering, pumped = _valve_flows(x, p)
+    flow_lifting, flow_lowering, pumped = _valve_flows(x, motion.stroke, p)
     leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
     lifting = flow_lifting - leak_lifting - chambers.relief_flow(x[P_H], p)
     volume = chambers.volume_lifting(motion.stroke, p)
@@ -213,7 +217,7 @@ def truth(x: Array, parameters: NDArray[Any]) -> Truth:
 def truth_of(x: Array, p: Any) -> Truth:
     """As `truth`, with the parameters of one machine."""
     motion = _motion(x, p)
-    flow_lifting, flow_lowering, _ = _valve_flows(x, p)
+    flow_lifting, flow_lowering, _ = _valve_flows(x, motion.stroke, p)
     bending = 0.0
     for i in range(p.mode_deflection.size):
         bending += p.mode_deflection[i] * x[MODES + i]

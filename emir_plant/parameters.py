@@ -10,7 +10,7 @@ from typing import Any
 
 from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
-from emir_plant.unnamed_force import UnnamedForce
+from emir_plant.unnamed import UnnamedForce, UnnamedLeakage, UnnamedOpening
 
 GRAVITY = 9.81  # m/s^2
 RATED_PAYLOAD = 1500.0  # kg, paper 1
@@ -131,6 +131,8 @@ class Machine:
     logic_block: LogicBlock
     sensors: Sensors
     unnamed_force: UnnamedForce = UnnamedForce()
+    unnamed_opening: UnnamedOpening = UnnamedOpening()
+    unnamed_leakage: UnnamedLeakage = UnnamedLeakage()
     effects: Effects = field(default_factory=Effects)
 
     def __post_init__(self) -> None:

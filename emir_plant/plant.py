@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core, linkage, unnamed_force
+from emir_plant import core, linkage
 from emir_plant.core import Array, Truth
 from emir_plant.effects import backlash, command_delay, external_load, linkage_error
 from emir_plant.hydraulics import logic_block
 from emir_plant.parameters import Machine
 from emir_plant.record import record
+from emir_plant.unnamed import force as unnamed_force
 
 
 class SimulationError(RuntimeError):

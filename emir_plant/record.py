@@ -9,28 +9,30 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import quantities
 from emir_plant.boom import BoomModes, boom_modes
+from emir_plant.curve import POINTS
 from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine, groups
-from emir_plant.unnamed_force import POINTS, UnnamedForce
+from emir_plant.unnamed import UNNAMED
 
+_UNNAMED = {f"{g}_{n}": q for g, kind in UNNAMED.items() for n, q in quantities(kind).items()}
+CURVES = tuple(name for name, about in _UNNAMED.items() if about.count)
 EFFECT_FIELDS = (
     *(f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)),
-    *(name for name, about in quantities(UnnamedForce).items() if not about.count),
+    *(name for name, about in _UNNAMED.items() if not about.count),
 )
-LISTS = tuple(name for name, about in quantities(UnnamedForce).items() if about.count)
 EFFECT_SIZES = (
     *(f"{effect}_{size}" for effect, kind in REGISTRY.items() for size in kind.sizes),
-    "curve_over",
+    *(f"{group}_over" for group in UNNAMED),
 )
 
 
 def record(machine: Machine) -> NDArray[Any]:
     """Return a structured array of one element with every parameter as a field.
 
-    Fields have the parameter's name; those of an effect carry the effect's name in front. The
-    boom's modes are added with the prefix `mode_`. One element, since numba reads an element
-    of an array twenty times faster than a record by itself.
+    Fields have the parameter's name; those of an effect, and of what has no name, carry the
+    group's name in front. The boom's modes are added with the prefix `mode_`. One element, since
+    numba reads an element of an array twenty times faster than a record by itself.
     """
     geometry = _with_effects(machine)
     # the modes do not know of this factor: machines that differ in it share them
@@ -45,7 +47,7 @@ def record(machine: Machine) -> NDArray[Any]:
 @cache
 def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
     """Return the record's layout: modal quantities are arrays over the modes, curves lists."""
-    shapes = dict.fromkeys(LISTS, (POINTS,))
+    shapes = dict.fromkeys(CURVES, (POINTS,))
     return np.dtype(
         [(n, np.float64, (modes,) if n.startswith("mode_") else shapes.get(n, ())) for n in names]
     )
@@ -60,8 +62,8 @@ def _with_effects(machine: Machine) -> Geometry:
 def _parameters(machine: Machine) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for path, group in groups(machine).items():
-        kind, _, effect = path.partition(".")
-        prefix = f"{effect}_" if kind == "effects" else ""
+        name = path.removeprefix("effects.")
+        prefix = f"{name}_" if name != path or name in UNNAMED else ""
         values |= {prefix + name: getattr(group, name) for name in quantities(group)}
     return values
 

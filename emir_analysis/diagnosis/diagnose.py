@@ -11,7 +11,7 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.search import Progress, Search, Tried
 from emir_analysis.diagnosis.select import limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
-from emir_analysis.diagnosis.unnamed import BALANCE, Curve, curve, measured
+from emir_analysis.diagnosis.unnamed import Curve, curve, measured
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
@@ -26,8 +26,8 @@ class Findings:
     among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
     `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
-    the loudest balance that no effect takes down to the noise, shape: of its residual. curve: a
-    missing force that has no name, with which `chosen` and `after` then are.
+    the loudest balance that no effect takes down to the noise, shape: of its residual. curve:
+    what has no name, with which `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -71,9 +71,9 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking = loudest(after, floor, limit)
     shape = None if speaking is None else _shape(evidence, after, speaking)
-    if verdict == "unexplained" and speaking == BALANCE:
-        progress("measuring the missing force")
-        with_curve = measured(refitted, evidence, search.floor)
+    if verdict == "unexplained" and speaking is not None:
+        progress("measuring what has no name")
+        with_curve = measured(refitted, search.balanced, evidence, search.floor)
         if with_curve is not None:
             final, after = with_curve, evidence.residuals([with_curve.machine])[0]
     return Findings(

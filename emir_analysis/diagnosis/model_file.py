@@ -8,7 +8,7 @@ import yaml
 
 from emir_analysis.errors import InputError
 from emir_plant.parameters import Machine
-from emir_plant.unnamed_force import NOTHING
+from emir_plant.unnamed import UNNAMED
 
 
 def write_model(file: Path, machine: Machine, recording: str) -> None:
@@ -18,8 +18,9 @@ def write_model(file: Path, machine: Machine, recording: str) -> None:
     InputError when the file cannot be written.
     """
     groups = {name: _plain(group) for name, group in vars(machine).items() if name != "effects"}
-    if machine.unnamed_force.curve_over == NOTHING:
-        del groups["unnamed_force"]
+    for name in UNNAMED:
+        if not getattr(machine, name).over:
+            del groups[name]
     effects = {
         name: _plain(effect)
         for name, effect in vars(machine.effects).items()

@@ -143,7 +143,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             )
         )
     if result.curve is not None:
-        caption = "The force that has no name as a curve in the machine, fitted to the free run."
+        caption = "What has no name, as a curve in the machine, fitted to the free run."
         blocks.append(Picture(curve_picture(result.curve), caption))
     return blocks
 

@@ -8,6 +8,7 @@ from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
+from emir_analysis.diagnosis.statement import PARTS
 from emir_analysis.diagnosis.unnamed import Curve
 from emir_analysis.report import new_figure
 
@@ -34,7 +35,10 @@ AGAINST = {
     "pressure_lifting": ("p_H, bar", 1e-5),
     "pressure_lowering": ("p_S, bar", 1e-5),
     "time": ("time, s", 1.0),
+    "own_pressure": ("the chamber's pressure, bar", 1e-5),
+    "valve_opening": ("opening as stated", 1.0),
 }
+PART = {"N": ("force, kN", 1e-3), "1": ("change, %", 1e2), "m^3/s": ("flow, l/min", 6e4)}
 
 
 def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
@@ -117,16 +121,14 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
 
 
 def curve_picture(curve: Curve) -> Figure:
-    """Show a force that has no name over the signal that it depends on."""
-    label, factor = SHOWN["force"]
+    """Show what has no name over the signal that it depends on."""
+    label, factor = PART[curve.part_unit]
     text, scale = AGAINST[curve.over]
     figure = new_figure(2.8)
     ax = figure.subplots()
-    parts = {"whatever the direction": curve.along, "against the motion": curve.friction}
-    for (name, points), colour in zip(parts.items(), (LOWERING, LIFTING), strict=True):
-        if any(points):
-            at, force = scale * np.array(curve.signal), factor * np.array(points)
-            ax.plot(at, force, ".-", ms=4, lw=1.0, color=colour, label=name)
+    for (name, points), colour in zip(curve.parts.items(), (LIFTING, LOWERING), strict=False):
+        at, size = scale * np.array(curve.signal), factor * np.array(points)
+        ax.plot(at, size, ".-", ms=4, lw=1.0, color=colour, label=PARTS[name])
     ax.set_xlabel(text)
     ax.set_ylabel(label)
     ax.legend(fontsize=8, loc="best")

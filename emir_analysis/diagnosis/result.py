@@ -29,6 +29,7 @@ from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
+from emir_plant.unnamed import UNNAMED
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -121,7 +122,7 @@ class Diagnosis:
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
     stays unexplained. at_end: parameters that were led to the end of what data sheet and registry
-    allow. curve: a force that has no name, which `with_effect` then has. untold: what missing
+    allow. curve: what has no name and `with_effect` then has. untold: what missing
     sensors leave open, by balance. control: a controller designed before and after, on the
     machine as found, where that was asked for.
     """
@@ -209,7 +210,7 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
 
 def _without_points(paths: Sequence[str]) -> tuple[str, ...]:
     """Return what is named among parameters: of a curve's points nobody would read a list."""
-    return tuple(path for path in paths if not path.startswith("unnamed_force."))
+    return tuple(path for path in paths if path.partition(".")[0] not in UNNAMED)
 
 
 def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, ...]]:

@@ -16,7 +16,14 @@ from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.unnamed import Curve
 
 MANY = 0.1  # share of the samples
-BEYOND = 0.01  # share of the judge recordings
+BEYOND = 0.05  # share of the judge recordings
+PARTS = {  # of a curve, as they are called
+    "along": "whatever the direction",
+    "friction": "against the motion",
+    "change": "of the opening as stated",
+    "lifting": "out of the lifting chamber",
+    "lowering": "out of the lowering chamber",
+}
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
@@ -105,11 +112,11 @@ def _judgement(findings: Findings, judged: Judged) -> str:
 
 
 def _measured(curve: Curve, judged: Judged) -> str:
-    parts = {"whatever the direction": curve.along, "against the motion": curve.friction}
-    most = {text: max(map(abs, points)) for text, points in parts.items()}
-    forces = " and ".join(f"up to {size:.3g} N {text}" for text, size in most.items() if size)
+    most = {PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
+    unit = "" if curve.part_unit == "1" else f" {curve.part_unit}"
+    sizes = " and ".join(f"up to {size:.3g}{unit} {text}" for text, size in most.items())
     return (
-        f"; with that measured as a curve over {curve.over}, {forces}, the free run of"
+        f"; measured as a curve, {curve.name} over {curve.over}, {sizes}, the free run of"
         f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
         f"{_beyond(curve, judged)}"
     )
@@ -117,7 +124,7 @@ def _measured(curve: Curve, judged: Judged) -> str:
 
 def _beyond(curve: Curve, judged: Judged) -> str:
     """Return that the judge recordings go where nothing was measured, if they do."""
-    if curve.over != STROKE:
+    if curve.over != STROKE:  # the others change little from one recording to another
         return ""
     strokes = np.concatenate([e.outputs[:, 0] for e in judged.evidence.experiments])
     outside = np.mean((strokes < curve.signal[0]) | (strokes > curve.signal[-1]))

@@ -1,7 +1,7 @@
-"""What no effect explains, measured: the missing force on the piston as a curve in the machine.
+"""What no effect explains, measured: as a curve in the machine over one of its signals.
 
-The balance says what is missing over windows of a second; the free run, begun from there, knows
-the curve as finely as the piston goes over it.
+The balances say what is missing over windows of half a second and more; the free run, begun from
+there, knows the curve as finely as the machine goes over it.
 """
 
 import math
@@ -13,55 +13,98 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from emir_analysis.diagnosis.balances import FORCE, FORCE_WINDOW
+from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_run_problem
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import Problem, fit
+from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.select import SEEN, STRONG, free_run_score
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
+from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
-from emir_plant.unnamed_force import NOTHING, POINTS, STROKE, VELOCITY
+from emir_plant.unnamed import UNNAMED, force, leakage, opening
 
-BALANCE = "force"
-OVER = {"piston_stroke": STROKE, "piston_velocity": VELOCITY}  # what a curve can run over
-UNITS = {"piston_stroke": "m", "piston_velocity": "m/s"}
-TOLD = 0.5  # share of the balance's variance from which on a curve is measured
+TOLD = 0.5  # share of the balances' squares from which on a curve is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
-MOST = 5.0  # times the size of what the balance shows: a curve goes no further
-ALONG, FRICTION = "along", "friction"  # whatever the direction of motion, against it
-FORMS = {
-    "piston_stroke": ((ALONG,), (FRICTION,), (ALONG, FRICTION)),
-    "piston_velocity": ((ALONG,),),  # what turns round with the velocity is in it
-}
+MOST = 10.0  # times its size: a curve goes no further
+BENDING = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve in units of its size
+SMOOTHING = "smoothing_speed"
+STROKE_COLUMN, PRESSURES = 0, (1, 2)  # of an experiment's outputs
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A curve, or several, that a machine may be given.
+
+    group: of the machine's parameters. over: name of the signal, code: the group's number for it.
+    forms: sets of the group's lists, of which the one is taken that the balances tell best.
+    """
+
+    group: str
+    over: str
+    unit: str
+    code: int
+    forms: tuple[tuple[str, ...], ...]
+
+
+KINDS = (
+    Kind(
+        "unnamed_force",
+        "piston_stroke",
+        "m",
+        force.STROKE,
+        (("along",), ("friction",), ("along", "friction")),
+    ),
+    # what turns round with the velocity is in a curve over it
+    Kind("unnamed_force", "piston_velocity", "m/s", force.VELOCITY, (("along",),)),
+    Kind("unnamed_opening", "piston_stroke", "m", opening.STROKE, (("change",),)),
+    Kind("unnamed_opening", "valve_opening", "1", opening.OPENING, (("change",),)),
+    Kind(
+        "unnamed_leakage",
+        "own_pressure",
+        "Pa",
+        leakage.PRESSURE,
+        (("lifting",), ("lowering",), ("lifting", "lowering")),
+    ),
+)
+
+
+CHAMBERS = {"lifting_chamber", "lowering_chamber"}
+SHOWN_BY = {"unnamed_force": {"force"}, "unnamed_opening": CHAMBERS, "unnamed_leakage": CHAMBERS}
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A missing force on the piston, N, over a signal, (p,) each.
+    """What has no name, over a signal, (p,).
 
-    along: whatever the direction, positive where it lifts. friction: against the motion.
+    name: of the machine's parameter group. unit: of the signal. parts: the group's lists that are
+    not zero, (p,) each, part_unit: theirs.
     """
 
+    name: str
     over: str
     unit: str
     signal: tuple[float, ...]
-    along: tuple[float, ...]
-    friction: tuple[float, ...]
+    part_unit: str
+    parts: dict[str, tuple[float, ...]]
 
 
-def measured(known: Trial, evidence: Evidence, floor: Array) -> Trial | None:
-    """Return a trial without effects, and the missing force as a curve in its machine.
+def measured(known: Trial, balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
+    """Return a trial without effects, and what is missing as a curve in its machine.
 
-    known: without it, fitted to the free run of the whole recordings. floor: (5,) of the balances.
-    None where no curve makes most of what the balance lacks, or where the free run behind what
-    the fit has seen is no nearer for it.
+    known, balanced: without it, fitted to the free run and to the balances of the whole
+    recordings. floor: (5,) of the balances. None where no curve makes most of what they lack, or
+    where the free run behind what the fit has seen is no nearer for it.
     """
-    begun = [_begun(known, over, evidence, floor) for over in OVER]
-    best = min(begun, key=lambda b: b.criterion)
-    if best.share < TOLD:
+    if not np.any(evidence.fitted):
+        return None
+    balances = _Balances(balanced, evidence, floor)
+    told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
+    begun = [s for kind in KINDS if SHOWN_BY[kind.group] & told for s in balances.begun(kind)]
+    best = min(begun, key=lambda b: b.criterion, default=None)
+    if best is None or best.share < TOLD:
         return None
     part = _fitted(best.trial, evidence.head(SEEN), (*GROWING, 1.0))
     # no point of the curve was fitted to that part, so they do not count as parameters
@@ -73,19 +116,21 @@ def measured(known: Trial, evidence: Evidence, floor: Array) -> Trial | None:
 
 def curve(machine: Machine) -> Curve | None:
     """Return the curve that a machine has, if it has one."""
-    force = machine.unnamed_force
-    if force.curve_over == NOTHING:
-        return None
-    over = next(name for name, code in OVER.items() if code == force.curve_over)
-    signal = np.linspace(force.curve_first, force.curve_last, POINTS)
-    points = tuple(map(float, signal))
-    return Curve(over, UNITS[over], points, force.curve_along, force.curve_friction)
+    for kind in KINDS:
+        group = getattr(machine, kind.group)
+        if group.over == kind.code:
+            names = [n for n, about in quantities(group).items() if about.count]
+            parts = {name: getattr(group, name) for name in names if any(getattr(group, name))}
+            signal = tuple(map(float, np.linspace(group.first, group.last, POINTS)))
+            part_unit = quantities(group)[names[0]].unit
+            return Curve(kind.group, kind.over, kind.unit, signal, part_unit, parts)
+    return None
 
 
 def _fitted(start: Trial, evidence: Evidence, shares: Sequence[float]) -> Trial:
     """Return a trial fitted to the free run of shares of the recordings, one after the other.
 
-    Where that tells the curves no more than the balance does, they stay smooth.
+    Where that tells the curves no more than the balances do, they stay smooth.
     """
     x, trial = np.append(start.x, np.zeros(2 * len(evidence.experiments))), start
     for share in shares:
@@ -96,14 +141,10 @@ def _fitted(start: Trial, evidence: Evidence, shares: Sequence[float]) -> Trial:
 
 def _smoothly(problem: Problem, trial: Trial) -> Problem:
     """Return a problem in which the curves' second differences are errors, too."""
-    paths = [unknown.path for unknown in trial.unknowns.members]
-    bending = [
-        np.diff(
-            np.eye(problem.start.size)[[k for k, p in enumerate(paths) if form in p]], 2, axis=0
-        )
-        for form in (f"curve_{ALONG}.", f"curve_{FRICTION}.")
-    ]
-    rows = np.vstack(bending) / BENT
+    lists = [u.path.rpartition(".")[0] for u in trial.unknowns.members]
+    each = [np.flatnonzero(np.array(lists) == name) for name in dict.fromkeys(lists)]
+    unit = np.eye(problem.start.size)
+    rows = np.vstack([BENDING @ unit[k] for k in each if k.size == POINTS])
 
     def smooth(model: Callable[[Array], Array]) -> Callable[[Array], Array]:
         return lambda points: np.hstack([model(points), points @ rows.T])
@@ -113,9 +154,9 @@ def _smoothly(problem: Problem, trial: Trial) -> Problem:
 
 
 class _Begun(NamedTuple):
-    """A trial with a curve as the balance has it.
+    """A trial with curves as the balances have them.
 
-    criterion: Bayesian, smaller is better. share: of the variance that the curve explains.
+    criterion: Bayesian, smaller is better. share: of the squares that the curves explain.
     """
 
     trial: Trial
@@ -123,81 +164,136 @@ class _Begun(NamedTuple):
     share: float
 
 
-class _Smooth(NamedTuple):
-    """Points of curves, (c p,), with a criterion and a share as in `_Begun`."""
+class _Balances:
+    """What the balances lack, linear in parameters and curves about a fitted trial."""
 
-    points: Array
-    criterion: float
-    share: float
+    def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
+        self._known, self._evidence, self._floor = known, evidence, floor
+        self._missing = self._left([known.machine])[0]
+        steps = np.where(known.x + STEP > known.unknowns.bounds[1], -STEP, STEP)
+        moved = self._left([known.machine, *map(known.unknowns.at, known.x + np.diag(steps))])
+        self._slopes = ((moved[1:] - moved[0]) / steps[:, None]).T
+        self._independent = evidence.duration(1.0) / FORCE_WINDOW
+
+    def _left(self, machines: Sequence[Machine]) -> Array:
+        """Return what is missing in all balances, (m, n), in units of the noise."""
+        left = self._evidence.residuals(machines) / self._floor
+        return np.asarray(left[:, :, self._evidence.fitted].reshape(len(machines), -1))
+
+    def begun(self, kind: Kind) -> list[_Begun]:
+        """Return trials with the smoothest curves that the balances allow, one for each form."""
+        first, last = _ends(kind, self._evidence)
+        values = {"over": kind.code, "first": first, "last": last}
+        named = {f"{kind.group}.{name}": value for name, value in values.items()}
+        machine = with_values(self._known.machine, named)
+        names = dict.fromkeys(name for form in kind.forms for name in form)
+        members = {name: _points(kind, name, self._size(kind)) for name in names}
+        slopes = {name: self._of_points(machine, points) for name, points in members.items()}
+        found = []
+        for form in kind.forms:
+            points = tuple(u for name in form for u in members[name])
+            found.append(self._smoothest(kind, machine, points, [slopes[n] for n in form]))
+        return found
+
+    def _size(self, kind: Kind) -> float:
+        """Return the size of what is missing, in the unit of a kind's curves."""
+        left = self._evidence.residuals([self._known.machine])[0]
+        rms = dict(zip(BALANCES, np.sqrt(np.nanmean(left**2, axis=0)), strict=True))
+        flow = max(rms["lifting_chamber"], rms["lowering_chamber"])
+        nominal = self._known.machine.valve.flow_nominal
+        sizes = {"unnamed_force": rms["force"], "unnamed_leakage": flow}
+        return float(np.nan_to_num(sizes.get(kind.group, flow / nominal), nan=1.0))
+
+    def _of_points(self, machine: Machine, points: tuple[Unknown, ...]) -> Array:
+        alone = Unknowns(machine, points)
+        moved = self._left([alone.at(x) for x in np.eye(len(points))])
+        return np.asarray((moved - self._missing).T)
+
+    def _smoothest(
+        self, kind: Kind, machine: Machine, points: tuple[Unknown, ...], slopes: list[Array]
+    ) -> _Begun:
+        """Return the trial by least squares, parameters inside their tolerances.
+
+        Curves' second differences are expected to be small beside their size. Those of their
+        points count as parameters that the balances tell in spite of that (trace of the hat
+        matrix).
+        """
+        known = self._known
+        count = len(slopes)
+        curves = np.hstack(slopes)
+        own = known.x.size
+        prior = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
+        bending = np.kron(np.eye(count), BENDING)
+        rows = np.vstack(
+            [
+                np.hstack([self._slopes, curves]),
+                np.hstack([prior, np.zeros((own, count * POINTS))]),
+                np.hstack([np.zeros((len(bending), own)), bending]),
+            ]
+        )
+        wanted = np.concatenate([-self._missing, -prior @ known.x, np.zeros(len(bending))])
+        low, high = known.unknowns.bounds
+        lowest, highest = Unknowns(machine, points).bounds
+        room = np.append(low - known.x, lowest), np.append(high - known.x, highest)
+        change = np.asarray(lsq_linear(rows, wanted, _opened(*room)).x)
+        x = np.clip(
+            np.append(known.x, np.zeros(len(points))) + change,
+            np.append(low, lowest),
+            np.append(high, highest),
+        )
+        extended = np.vstack([curves, bending])
+        told = float(np.trace(np.linalg.pinv(extended.T @ extended) @ (curves.T @ curves)))
+        left = self._missing + np.hstack([self._slopes, curves]) @ change
+        members = (*known.unknowns.members, *points)
+        if any(u.path.startswith("unnamed_force.friction.") for u in points):
+            members, x = (*members, _smoothing(machine)), np.append(x, 0.0)
+        trial = Trial((), Unknowns(machine, members), x, np.full((x.size, x.size), np.nan))
+        return _Begun(
+            trial,
+            self._criterion(left, told),
+            1.0 - float(np.sum(left**2) / np.sum(self._missing**2)),
+        )
+
+    def _criterion(self, left: Array, told: float) -> float:
+        balances = left.reshape(-1, np.count_nonzero(self._evidence.fitted))
+        squares = np.maximum(np.mean(balances**2, axis=0), 1.0)
+        misfit = self._independent * float(np.sum(np.log(squares)))
+        return misfit + told * math.log(self._independent * squares.size)
 
 
-def _begun(known: Trial, over: str, evidence: Evidence, floor: Array) -> _Begun:
-    """Return the trial with the smoothest curves that the force balance allows."""
-    first, last = _ends(over, evidence)
-    values = {"curve_over": OVER[over], "curve_first": first, "curve_last": last}
-    named = {f"unnamed_force.{name}": value for name, value in values.items()}
-    machine = with_values(known.machine, named)
-    left = evidence.residuals([machine])[0, :, FORCE] / floor[FORCE]
-    size = float(np.sqrt(np.mean(left**2)) * floor[FORCE])
-    members = {form: _points(form, size) for form in (ALONG, FRICTION)}
-    both = Unknowns(machine, tuple(u for form in members.values() for u in form))
-    # what is missing is linear in the curves' points
-    moved = evidence.residuals([both.at(x) for x in np.eye(len(both.members))])
-    slopes = (moved[:, :, FORCE] / floor[FORCE] - left).T
-    each = dict(zip(members, np.split(slopes, len(members), axis=1), strict=True))
-    independent = evidence.duration(1.0) / FORCE_WINDOW
-    fits = {
-        form: _smoothest(left, np.hstack([each[f] for f in form]), len(form), independent)
-        for form in FORMS[over]
-    }
-    form = min(fits, key=lambda f: fits[f].criterion)
-    chosen = tuple(u for f in form for u in members[f])
-    x = np.append(known.x, np.clip(fits[form].points, *Unknowns(machine, chosen).bounds))
-    if FRICTION in form:
-        chosen, x = (*chosen, _smoothing(machine)), np.append(x, 0.0)
-    everything = Unknowns(machine, (*known.unknowns.members, *chosen))
-    trial = Trial((), everything, x, np.full((x.size, x.size), np.nan))
-    return _Begun(trial, fits[form].criterion, fits[form].share)
+def _opened(low: Array, high: Array) -> tuple[Array, Array]:
+    """Return bounds with room between them, which the solver wants."""
+    return low - ROUNDING, high + ROUNDING
 
 
-def _points(form: str, size: float) -> tuple[Unknown, ...]:
-    """Return a curve's points as unknowns in units of what the balance shows, N."""
-    least = 0.0 if form == FRICTION else -MOST
+def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
+    """Return a curve's points as unknowns in units of a size."""
+    about = quantities(UNNAMED[kind.group])[name]
+    low, high = max(about.low / size, -MOST), min(about.high / size, MOST)
     return tuple(
-        Unknown(f"unnamed_force.curve_{form}.{k}", "N", 0.0, size, least, MOST, 0.0, False)
+        Unknown(f"{kind.group}.{name}.{k}", about.unit, 0.0, size, low, high, 0.0, False)
         for k in range(POINTS)
     )
 
 
 def _smoothing(machine: Machine) -> Unknown:
     """Return the speed at which friction turns round, between two windows of the balance."""
-    name = "curve_smoothing_speed"
-    about = quantities(machine.unnamed_force)[name]
-    usual = machine.unnamed_force.curve_smoothing_speed
+    about = quantities(machine.unnamed_force)[SMOOTHING]
+    usual = machine.unnamed_force.smoothing_speed
     low, high = math.log(about.low / usual) + ROUNDING, math.log(about.high / usual) - ROUNDING
-    return Unknown(f"unnamed_force.{name}", about.unit, usual, 1.0, low, high, 0.0, False, True)
+    path = f"unnamed_force.{SMOOTHING}"
+    return Unknown(path, about.unit, usual, 1.0, low, high, 0.0, False, True)
 
 
-def _ends(over: str, evidence: Evidence) -> tuple[float, float]:
+def _ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:
     """Return the least and the greatest value, SI unit, that a curve's signal takes."""
-    if OVER[over] == STROKE:
-        strokes = np.concatenate([e.outputs[:, 0] for e in evidence.experiments])
-        return float(strokes.min()), float(strokes.max())
-    return -evidence.fastest, evidence.fastest
-
-
-def _smoothest(missing: Array, slopes: Array, curves: int, independent: float) -> _Smooth:
-    """Return the curves' points by least squares.
-
-    missing: (w,), slopes: (w, c p), in units of the noise. A curve's second differences are
-    expected to be small beside its size, and count as errors; parameters are those that the
-    balance tells in spite of that (the trace of the hat matrix). independent: windows.
-    """
-    bending = np.diff(np.eye(POINTS), 2, axis=0) / BENT
-    rows = np.vstack([slopes, np.kron(np.eye(curves), bending)])
-    wanted = np.append(-missing, np.zeros(len(rows) - missing.size))
-    x = np.asarray(lsq_linear(rows, wanted).x)
-    told = np.trace(np.linalg.pinv(rows.T @ rows) @ (slopes.T @ slopes))
-    left, before = float(np.mean((missing + slopes @ x) ** 2)), float(np.mean(missing**2))
-    criterion = independent * math.log(left) + float(told) * math.log(independent)
-    return _Smooth(x, criterion, 1.0 - left / before)
+    if kind.over == "piston_velocity":
+        return -evidence.fastest, evidence.fastest
+    if kind.over == "valve_opening":
+        most = max(float(np.abs(e.commands).max()) for e in evidence.experiments)
+        return -most, most
+    columns = {"piston_stroke": (STROKE_COLUMN,), "own_pressure": PRESSURES}[kind.over]
+    outputs = np.concatenate([e.outputs[:, columns] for e in evidence.experiments])
+    about = quantities(UNNAMED[kind.group])["first"]
+    ends = np.clip([np.nanmin(outputs), np.nanmax(outputs)], about.low, about.high)
+    return float(ends[0]), float(ends[1])

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import unnamed_force
 from emir_plant.effects import (
     backlash,
     coulomb_friction,
@@ -21,6 +20,9 @@ from emir_plant.effects import (
     viscous_friction,
 )
 from emir_plant.jit import compiled
+from emir_plant.unnamed import force as unnamed_force
+from emir_plant.unnamed import leakage as unnamed_leakage
+from emir_plant.unnamed import opening as unnamed_opening
 
 Array = NDArray[np.float64]
 
@@ -70,7 +72,7 @@ def named_dry_friction(velocity: float, load: float, p: Any) -> float:
 def has_dry_friction(p: Any) -> bool:
     """Tell whether the machine has any of it."""
     force = p.coulomb_friction_force + p.stribeck_friction_force
-    return force + p.pressure_dependent_friction_coefficient + p.curve_over > 0.0
+    return force + p.pressure_dependent_friction_coefficient + p.unnamed_force_over > 0.0
 
 
 @compiled
@@ -79,6 +81,8 @@ def leakage(pressure_lifting: float, pressure_lowering: float, p: Any) -> tuple[
     across = internal_leakage.flow(pressure_lifting, pressure_lowering, p)
     lifting = external_leakage.flow(pressure_lifting, p.external_leakage_lifting, p)
     lowering = external_leakage.flow(pressure_lowering, p.external_leakage_lowering, p)
+    lifting += unnamed_leakage.flow(pressure_lifting, p.unnamed_leakage_lifting, p)
+    lowering += unnamed_leakage.flow(pressure_lowering, p.unnamed_leakage_lowering, p)
     return across + lifting, lowering - across
 
 
@@ -92,6 +96,10 @@ def stiffness(pressure: float, volume: float, compliance: float, p: Any) -> floa
 
 
 @compiled
-def opening(stated: float, time: float, p: Any) -> float:
-    """Return the opening of the metering edges at a time, s, from the one as stated."""
-    return valve_gain_asymmetry.scaled(stated, p) * flow_gain_drift.gain(time, p)
+def opening(stated: float, time: float, stroke: float, p: Any) -> float:
+    """Return the opening of the metering edges at a time, s, from the one as stated.
+
+    stroke: of the piston, m.
+    """
+    scaled = valve_gain_asymmetry.scaled(stated, p) * flow_gain_drift.gain(time, p)
+    return scaled * unnamed_opening.factor(stated, stroke, p)

@@ -26,7 +26,7 @@ from emir_plant.parameters import Machine
 from emir_plant.record import record
 from emir_plant.robot.parameters import Joint, Robot
 from emir_plant.robot.reach import Reach
-from emir_plant.unnamed_force import NOTHING
+from emir_plant.unnamed import UNNAMED
 
 Array = NDArray[np.float64]
 
@@ -62,8 +62,9 @@ def machines(robot: Robot, reaches: tuple[Reach, ...]) -> tuple[Machine, ...]:
     ParameterError for an effect that is switched on and has no place here.
     """
     _check_effects(robot.main.effects, EFFECTS, "")
-    if robot.main.unnamed_force.curve_over != NOTHING:
-        raise ParameterError("unnamed_force: not in the model of the whole robot")
+    for group in UNNAMED:
+        if getattr(robot.main, group).over:
+            raise ParameterError(f"{group}: not in the model of the whole robot")
     for name, effects in robot.effects.items():
         _check_effects(effects, tuple(e for e in EFFECTS if e != "payload"), f"{name}.")
     others = (
@@ -139,7 +140,7 @@ def _valve_sized(main: Machine, flow: float, values: dict[str, float], effects: 
 @compiled
 def _valve_flows(x: Array, supply: float, p: Any) -> tuple[float, float, float]:
     """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
-    opening = terms.opening(valve.opening(x[SPOOL], p), 0.0, p)
+    opening = terms.opening(valve.opening(x[SPOOL], p), 0.0, 0.0, p)
     lifting, lowering = flows(opening, Pressures(supply, x[P_H], x[P_S]), x[LOGIC], p)
     return lifting, lowering, delivered(opening, lifting, lowering)
 

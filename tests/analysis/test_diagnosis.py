@@ -172,9 +172,9 @@ def test_an_effect_outside_the_registry_is_called_unexplained(
     # it has no name, but a curve, with which the machine can be foreseen
     assert result.curve is not None
     assert result.curve.over == "piston_stroke"
-    assert not any(result.curve.along)
+    assert result.curve.parts.keys() == {"friction"}
     law = [tight_spot(stroke, 1.0) for stroke in result.curve.signal]
-    assert result.curve.friction == pytest.approx(law, abs=0.05 * 40e3)
+    assert result.curve.parts["friction"] == pytest.approx(law, abs=0.05 * 40e3)
     for name, signal in result.signals.items():
         assert signal.refitted > EXPLAINED * signal.noise, name
         assert signal.with_effect < AT_NOISE * signal.noise, name

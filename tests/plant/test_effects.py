@@ -622,7 +622,7 @@ def test_gain_has_drifted_by_its_change_after_a_minute_and_ends() -> None:
     assert flow_gain_drift.gain(60.0, p) == pytest.approx(1.2)
     end = 0.2 / (1.0 - math.exp(-1.0))
     assert flow_gain_drift.gain(1e6, p) == pytest.approx(1.0 + end)
-    assert terms.opening(-0.5, 1e6, p) == pytest.approx(-0.5 * (1.0 + end))
+    assert terms.opening(-0.5, 1e6, 0.5, p) == pytest.approx(-0.5 * (1.0 + end))
 
 
 def test_gain_that_drifts_long_goes_straight_and_never_below_nothing() -> None:

@@ -16,7 +16,7 @@ FILE = Path(__file__).parents[2] / "emir_plant" / "data" / "joint1.yaml"
 
 def test_every_number_of_the_machine_has_a_source() -> None:
     sheet = load_sheet(FILE, strict=True)
-    beside = ("effects.", "unnamed_force.")  # off unless somebody finds or measures them
+    beside = ("effects.", "unnamed_")  # off unless somebody finds or measures them
     own = {path for path in declared(sheet.machine) if not path.startswith(beside)}
     assert sheet.sources.keys() == own
     assert sheet.machine == joint1()

@@ -53,9 +53,9 @@ from emir_msgs_py.topics import (
     TOPICS,
     by_name,
 )
+from emir_plant.curve import POINTS
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
-from emir_plant.unnamed_force import POINTS
 from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.run import main as run_graph
 
@@ -409,7 +409,7 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     file.write_text(
         "cascade_node: {ros__parameters: {gain: 1.5}}\n"
         "plant_node: {ros__parameters: {effects.payload.mass: 500.0, sensors.seed: 7,\n"
-        f"  unnamed_force: {{curve_over: 1, curve_friction: {curve}}}}}}}\n"
+        f"  unnamed_force: {{over: 1, friction: {curve}}}}}}}\n"
     )
     words = ["--params", str(file), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(bag)]) == 0
@@ -422,8 +422,8 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     assert parameters["cascade_node"]["gain"] == 1.5
     assert parameters["plant_node"]["valve.dead_zone"] == joint1().valve.dead_zone
     assert parameters["plant_node"]["effects.coulomb_friction.force"] == 0.0
-    assert parameters["plant_node"]["unnamed_force.curve_friction"] == curve
-    effects = "payload mass = 500 kg; unnamed_force over the stroke up to 3.2e+04 N"
+    assert parameters["plant_node"]["unnamed_force.friction"] == curve
+    effects = "payload mass = 500 kg; unnamed_force"
     assert stored["emir.machine"] == {"effects": effects, "seed": "7"}
     assert {f"effects: {effects}", "seed: 7"} <= set(text(info(bag)).splitlines())
     for channel in summary.channels.values():

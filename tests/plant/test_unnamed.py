@@ -10,11 +10,12 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant import core
 from emir_plant.core import Truth
+from emir_plant.curve import POINTS
 from emir_plant.plant import Plant
 from emir_plant.robot.actuators import machines
 from emir_plant.robot.sheet import robot
 from emir_plant.sheet import data, joint1, load_sheet
-from emir_plant.unnamed_force import POINTS, STROKE, VELOCITY
+from emir_plant.unnamed.force import STROKE, VELOCITY
 
 FORTY_FIVE = math.radians(45.0)
 T = {name: k for k, name in enumerate(Truth._fields)}
@@ -22,13 +23,11 @@ STATED = data("joint1.yaml")
 
 
 def _plant(over: int, ends: tuple[float, float], **curves: list[float]) -> Plant:
-    values: dict[str, object] = {
-        f"unnamed_force.curve_{form}": points for form, points in curves.items()
-    }
+    values: dict[str, object] = {f"unnamed_force.{form}": points for form, points in curves.items()}
     values |= {
-        "unnamed_force.curve_over": over,
-        "unnamed_force.curve_first": ends[0],
-        "unnamed_force.curve_last": ends[1],
+        "unnamed_force.over": over,
+        "unnamed_force.first": ends[0],
+        "unnamed_force.last": ends[1],
     }
     return Plant(with_values(joint1(), values))
 
@@ -45,7 +44,7 @@ def _run(plant: Plant) -> np.ndarray:
     return plant.simulate(plant.initial(FORTY_FIVE, 25e5), commands, 1e-3)
 
 
-def test_between_its_points_a_curve_is_the_cubic_of_its_chords() -> None:
+def test_between_its_points_a_is_the_cubic_of_its_chords() -> None:
     """The pressure at rest, where the oil carries what the curve does not."""
     points = np.random.default_rng(0).uniform(-5e4, 5e4, POINTS)
     ends = (0.2, 0.7)
@@ -64,7 +63,7 @@ def test_between_its_points_a_curve_is_the_cubic_of_its_chords() -> None:
         assert force == pytest.approx(expected, abs=1e-6 * 5e4)
 
 
-def test_a_curve_at_rest_leaves_the_boom_at_rest() -> None:
+def test_a_at_rest_leaves_the_boom_at_rest() -> None:
     plant = _plant(STROKE, (0.2, 0.7), along=[2e4] * POINTS, friction=[3e4] * POINTS)
     run = plant.simulate(plant.initial(FORTY_FIVE, 25e5), np.zeros(3000), 1e-3)
     assert np.ptp(run[:, T["stroke"]]) < 1e-9
@@ -105,14 +104,14 @@ def test_a_force_over_the_stroke_gives_back_what_it_takes() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{curve_friction: [1.0, 2.0]}", f"not a list of {POINTS} numbers"),
-        ("{curve_friction: 1.0}", f"not a list of {POINTS} numbers"),
-        (f"{{curve_friction: {[-1.0] * POINTS}}}", r"curve_friction.0 = -1: outside 0 ... "),
-        (f"{{curve_along: {['soft'] * POINTS}}}", r"curve_along.0 = 'soft': not a number"),
-        ("{curve_over: 3}", r"curve_over = 3: outside 0 ... 2"),
+        ("{friction: [1.0, 2.0]}", f"not a list of {POINTS} numbers"),
+        ("{friction: 1.0}", f"not a list of {POINTS} numbers"),
+        (f"{{friction: {[-1.0] * POINTS}}}", r"friction.0 = -1: outside 0 ... "),
+        (f"{{along: {['soft'] * POINTS}}}", r"along.0 = 'soft': not a number"),
+        ("{over: 3}", r"over = 3: outside 0 ... 2"),
     ],
 )
-def test_a_bad_curve_is_told_in_one_line(
+def test_a_bad_is_told_in_one_line(
     text: str, said: str, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     file = tmp_path_factory.mktemp("machine") / "machine.yaml"
@@ -122,18 +121,18 @@ def test_a_bad_curve_is_told_in_one_line(
     assert "\n" not in str(error.value)
 
 
-def test_a_point_of_a_curve_is_set_by_its_place() -> None:
-    machine = with_values(joint1(), {"unnamed_force.curve_friction.3": 5.0})
-    assert machine.unnamed_force.curve_friction[2:5] == (0.0, 5.0, 0.0)
+def test_a_point_of_a_is_set_by_its_place() -> None:
+    machine = with_values(joint1(), {"unnamed_force.friction.3": 5.0})
+    assert machine.unnamed_force.friction[2:5] == (0.0, 5.0, 0.0)
     for place in (str(POINTS), "-1", "first"):
-        with pytest.raises(ParameterError, match=f"curve_friction.{place}: there is no such"):
-            with_values(joint1(), {f"unnamed_force.curve_friction.{place}": 5.0})
+        with pytest.raises(ParameterError, match=f"friction.{place}: there is no such"):
+            with_values(joint1(), {f"unnamed_force.friction.{place}": 5.0})
 
 
 def test_the_whole_robot_says_that_it_has_none(tmp_path_factory: pytest.TempPathFactory) -> None:
     pytest.importorskip("pinocchio")
     file = tmp_path_factory.mktemp("machine") / "machine.yaml"
-    file.write_text(f"based_on: {STATED}\nunnamed_force: {{curve_over: 1}}\n")
+    file.write_text(f"based_on: {STATED}\nunnamed_force: {{over: 1}}\n")
     known = robot(None, file)
     with pytest.raises(ParameterError, match="unnamed_force: not in the model of the whole robot"):
         machines(known, ())

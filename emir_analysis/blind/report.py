@@ -7,6 +7,7 @@ import numpy as np
 
 from emir_analysis.blind.trial import Outcome
 
+EXPLAINED = 2.0  # times the sensor noise: what a model that explains a signal comes to
 AT_NOISE = 1.1  # times the sensor noise: what a model that lacks nothing comes to
 STAGES = {"nominal": "as stated", "refitted": "re-fitted", "with_effect": "with the effect"}
 
@@ -80,8 +81,16 @@ def _rates(outcomes: Sequence[Outcome]) -> str:
         share("healthy machine, false alarm", healthy,
               sum(o.verdict != "nothing_missing" for o in healthy)),
         share("foreign effect, unexplained", foreign, sum(map(right, foreign))),
+        share("  and measured as a curve, within twice the noise", foreign,
+              sum(map(_measured, foreign))),
     ]  # fmt: skip
     return "\n".join(line for line in lines if line)
+
+
+def _measured(o: Outcome) -> bool:
+    """Tell whether the machine is explained though what it has got no name."""
+    errors = o.errors.get("with_effect", {}).values()
+    return right(o) and bool(errors) and max(errors) <= EXPLAINED
 
 
 def _half(o: Outcome) -> bool:

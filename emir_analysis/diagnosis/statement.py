@@ -52,8 +52,10 @@ def _of_findings(findings: Findings) -> str:
         noise_share = size / findings.floor[column]
         remainder = (
             f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
-            f" ({noise_share:.1f} times its noise); {_described(shape)}"
+            f" ({noise_share:.1f} times its noise)"
         )
+        if findings.curve is None:
+            remainder += f"; {_described(shape)}"
     if findings.verdict == "unexplained":
         rejected = " and ".join(findings.rejected)
         known = f"{rejected} comes closest but leaves too much; " if rejected else ""

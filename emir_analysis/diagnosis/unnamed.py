@@ -17,7 +17,7 @@ from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_run_problem
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
-from emir_analysis.diagnosis.select import SEEN, STRONG, free_run_score
+from emir_analysis.diagnosis.select import EXPLAINED, SEEN, STRONG, excess, free_run_score
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -96,7 +96,8 @@ def measured(known: Trial, balanced: Trial, evidence: Evidence, floor: Array) ->
 
     known, balanced: without it, fitted to the free run and to the balances of the whole
     recordings. floor: (5,) of the balances. None where no curve makes most of what they lack, or
-    where the free run behind what the fit has seen is no nearer for it.
+    where with it the free run is no nearer behind what the fit has seen, nor explained on the
+    whole: in the last part the machine may go where it never was before.
     """
     if not np.any(evidence.fitted):
         return None
@@ -109,9 +110,9 @@ def measured(known: Trial, balanced: Trial, evidence: Evidence, floor: Array) ->
     part = _fitted(best.trial, evidence.head(SEEN), (*GROWING, 1.0))
     # no point of the curve was fitted to that part, so they do not count as parameters
     score = partial(free_run_score, evidence=evidence, unknowns=0)
-    if score(part) > score(known) - STRONG:
-        return None
-    return _fitted(part, evidence, (1.0,))
+    nearer = score(part) < score(known) - STRONG
+    whole = _fitted(part, evidence, (1.0,))
+    return whole if nearer or excess(whole, evidence) <= EXPLAINED**2 - 1.0 else None
 
 
 def curve(machine: Machine) -> Curve | None:
@@ -198,11 +199,15 @@ class _Balances:
     def _size(self, kind: Kind) -> float:
         """Return the size of what is missing, in the unit of a kind's curves."""
         left = self._evidence.residuals([self._known.machine])[0]
-        rms = dict(zip(BALANCES, np.sqrt(np.nanmean(left**2, axis=0)), strict=True))
-        flow = max(rms["lifting_chamber"], rms["lowering_chamber"])
-        nominal = self._known.machine.valve.flow_nominal
-        sizes = {"unnamed_force": rms["force"], "unnamed_leakage": flow}
-        return float(np.nan_to_num(sizes.get(kind.group, flow / nominal), nan=1.0))
+        rms = dict(zip(BALANCES, np.sqrt(np.mean(left**2, axis=0)), strict=True))
+        if kind.group == "unnamed_force":
+            return float(rms["force"])
+        flow = max(f for name, f in rms.items() if name in CHAMBERS and np.isfinite(f))
+        if kind.group == "unnamed_leakage":
+            return float(flow)
+        speed = self._evidence.signals()["piston_velocity"][1]
+        swept = self._known.machine.cylinder.area_lifting * np.sqrt(np.mean(speed**2))
+        return float(flow / swept)
 
     def _of_points(self, machine: Machine, points: tuple[Unknown, ...]) -> Array:
         alone = Unknowns(machine, points)

@@ -193,6 +193,7 @@ def test_figures_mean_what_they_say() -> None:
     assert "an effect of the catalogue called nothing 1 of 5" in lines
     assert "healthy machine, false alarm 1 of 2" in lines
     assert "foreign effect, unexplained 2 of 3" in lines
+    assert "and measured as a curve, within twice the noise 2 of 3" in lines
     assert "piston_stroke 3.00 (3.00) 2.00 (2.00) 1.00 (1.00)" in lines
     assert "every signal within 1.1 times the noise: 2 of 2" in lines
 

@@ -3,9 +3,31 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from emir_analysis.blind.puzzle import KINDS
+from emir_analysis.blind.trial import Plan, trial
 from emir_analysis.cli import main
+
+FOREIGN = (Path(__file__).parent / "foreign.py").read_text()
+
+
+def test_edges_that_close_along_the_stroke_have_no_name_but_a_curve(tmp_path: Path) -> None:
+    """A cushion at the upper end, which the second model makes and no effect of the registry."""
+    plan = Plan(seed=502, duration=30.0, foreign=FOREIGN, only=("end_cushion",))
+    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    assert outcome.hidden == ["end_cushion"]
+    assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
+    assert max(outcome.errors["refitted"].values()) > 10.0
+    assert max(outcome.errors["with_effect"].values()) < 2.0
+    (answer,) = tmp_path.glob("*/answer.json")
+    curve = json.loads(answer.read_text())["curve"]
+    assert (curve["name"], curve["over"]) == ("unnamed_opening", "piston_stroke")
+    s = outcome.sizes
+    inside = np.clip((np.array(curve["signal"]) - s["cushion_from"]) / 0.1, 0.0, 1.0)
+    law = -s["cushion"] * inside * inside * (3.0 - 2.0 * inside)
+    assert curve["parts"]["change"] == pytest.approx(law, abs=0.1 * s["cushion"])
 
 
 def test_a_load_is_found_that_nobody_told_of(

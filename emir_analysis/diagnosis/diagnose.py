@@ -73,7 +73,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     shape = None if speaking is None else _shape(evidence, after, speaking)
     if verdict == "unexplained" and speaking is not None:
         progress("measuring what has no name")
-        with_curve = measured(refitted, search.balanced, evidence, search.floor)
+        with_curve = measured(search.balanced, evidence, search.floor)
         if with_curve is not None:
             final, after = with_curve, evidence.residuals([with_curve.machine])[0]
     return Findings(

@@ -7,7 +7,6 @@ there, knows the curve as finely as the machine goes over it.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_run_problem
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
-from emir_analysis.diagnosis.select import EXPLAINED, SEEN, STRONG, excess, free_run_score
+from emir_analysis.diagnosis.select import EXPLAINED, excess
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -91,28 +90,21 @@ class Curve:
     parts: dict[str, tuple[float, ...]]
 
 
-def measured(known: Trial, balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
+def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     """Return a trial without effects, and what is missing as a curve in its machine.
 
-    known, balanced: without it, fitted to the free run and to the balances of the whole
-    recordings. floor: (5,) of the balances. None where no curve makes most of what they lack, or
-    where with it the free run is no nearer behind what the fit has seen, nor explained on the
-    whole: in the last part the machine may go where it never was before.
+    balanced: without it, fitted to the balances of the whole recordings. floor: (5,) of the
+    balances. None where no curve makes most of what they lack, or where with it the free run is
+    not explained.
     """
-    if not np.any(evidence.fitted):
-        return None
     balances = _Balances(balanced, evidence, floor)
     told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
     begun = [s for kind in KINDS if SHOWN_BY[kind.group] & told for s in balances.begun(kind)]
     best = min(begun, key=lambda b: b.criterion, default=None)
     if best is None or best.share < TOLD:
         return None
-    part = _fitted(best.trial, evidence.head(SEEN), (*GROWING, 1.0))
-    # no point of the curve was fitted to that part, so they do not count as parameters
-    score = partial(free_run_score, evidence=evidence, unknowns=0)
-    nearer = score(part) < score(known) - STRONG
-    whole = _fitted(part, evidence, (1.0,))
-    return whole if nearer or excess(whole, evidence) <= EXPLAINED**2 - 1.0 else None
+    found = _fitted(best.trial, evidence)
+    return found if excess(found, evidence) <= EXPLAINED**2 - 1.0 else None
 
 
 def curve(machine: Machine) -> Curve | None:
@@ -128,13 +120,13 @@ def curve(machine: Machine) -> Curve | None:
     return None
 
 
-def _fitted(start: Trial, evidence: Evidence, shares: Sequence[float]) -> Trial:
-    """Return a trial fitted to the free run of shares of the recordings, one after the other.
+def _fitted(start: Trial, evidence: Evidence) -> Trial:
+    """Return a trial fitted to the free run of the recordings, first of their beginning.
 
     Where that tells the curves no more than the balances do, they stay smooth.
     """
     x, trial = np.append(start.x, np.zeros(2 * len(evidence.experiments))), start
-    for share in shares:
+    for share in (*GROWING, 1.0):
         solution = fit(_smoothly(free_run_problem(trial, evidence, x, share), trial), ACCURACY)
         x, trial = solution.x, trial.continued(solution)
     return trial

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
@@ -28,7 +29,9 @@ from emir_plant.unnamed import UNNAMED, force, leakage, opening
 TOLD = 0.5  # share of the balances' squares from which on a curve is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
 MOST = 10.0  # times its size: a curve goes no further
-BENDING = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve in units of its size
+BENDING: Array = (
+    np.diff(np.eye(POINTS), 2, axis=0) / BENT
+)  # (p - 2, p), of a curve in units of its size
 SMOOTHING = "smoothing_speed"
 STROKE_COLUMN, PRESSURES = 0, (1, 2)  # of an experiment's outputs
 
@@ -165,7 +168,7 @@ class _Balances:
         self._missing = self._left([known.machine])[0]
         steps = np.where(known.x + STEP > known.unknowns.bounds[1], -STEP, STEP)
         moved = self._left([known.machine, *map(known.unknowns.at, known.x + np.diag(steps))])
-        self._slopes = ((moved[1:] - moved[0]) / steps[:, None]).T
+        self._slopes = np.nan_to_num(((moved[1:] - moved[0]) / steps[:, None]).T)
         self._independent = evidence.duration(1.0) / FORCE_WINDOW
 
     def _left(self, machines: Sequence[Machine]) -> Array:
@@ -185,7 +188,7 @@ class _Balances:
         found = []
         for form in kind.forms:
             points = tuple(u for name in form for u in members[name])
-            found.append(self._smoothest(kind, machine, points, [slopes[n] for n in form]))
+            found.append(self._smoothest(machine, points, [slopes[n] for n in form]))
         return found
 
     def _size(self, kind: Kind) -> float:
@@ -202,65 +205,64 @@ class _Balances:
         return float(flow / swept)
 
     def _of_points(self, machine: Machine, points: tuple[Unknown, ...]) -> Array:
+        """Return the slopes, (n, p), of what is missing by a curve's points."""
         alone = Unknowns(machine, points)
         moved = self._left([alone.at(x) for x in np.eye(len(points))])
-        return np.asarray((moved - self._missing).T)
+        return np.asarray(np.nan_to_num((moved - self._missing).T))
 
     def _smoothest(
-        self, kind: Kind, machine: Machine, points: tuple[Unknown, ...], slopes: list[Array]
+        self, machine: Machine, points: tuple[Unknown, ...], slopes: list[Array]
     ) -> _Begun:
-        """Return the trial by least squares, parameters inside their tolerances.
+        """Return the trial by least squares, parameters and points inside their bounds.
 
-        Curves' second differences are expected to be small beside their size. Those of their
-        points count as parameters that the balances tell in spite of that (trace of the hat
-        matrix).
+        slopes: (n, p) of each curve. Curves' second differences are expected to be small beside
+        their size, parameters to be as stated.
         """
-        known = self._known
-        count = len(slopes)
-        curves = np.hstack(slopes)
-        own = known.x.size
-        prior = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
-        bending = np.kron(np.eye(count), BENDING)
-        rows = np.vstack(
-            [
-                np.hstack([self._slopes, curves]),
-                np.hstack([prior, np.zeros((own, count * POINTS))]),
-                np.hstack([np.zeros((len(bending), own)), bending]),
-            ]
-        )
-        wanted = np.concatenate([-self._missing, -prior @ known.x, np.zeros(len(bending))])
-        low, high = known.unknowns.bounds
-        lowest, highest = Unknowns(machine, points).bounds
-        room = np.append(low - known.x, lowest), np.append(high - known.x, highest)
-        change = np.asarray(lsq_linear(rows, wanted, _opened(*room)).x)
-        x = np.clip(
-            np.append(known.x, np.zeros(len(points))) + change,
-            np.append(low, lowest),
-            np.append(high, highest),
-        )
-        extended = np.vstack([curves, bending])
-        told = float(np.trace(np.linalg.pinv(extended.T @ extended) @ (curves.T @ curves)))
-        left = self._missing + np.hstack([self._slopes, curves]) @ change
-        members = (*known.unknowns.members, *points)
-        if any(u.path.startswith("unnamed_force.friction.") for u in points):
-            members, x = (*members, _smoothing(machine)), np.append(x, 0.0)
-        trial = Trial((), Unknowns(machine, members), x, np.full((x.size, x.size), np.nan))
-        return _Begun(
-            trial,
-            self._criterion(left, told),
-            1.0 - float(np.sum(left**2) / np.sum(self._missing**2)),
-        )
+        known, curves = self._known, np.hstack(slopes)
+        stated = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
+        bending = np.asarray(np.kron(np.eye(len(slopes)), BENDING), dtype=np.float64)
+        straight = np.hstack([self._slopes, curves])
+        rows = np.vstack([straight, block_diag(stated, bending)])
+        wanted = np.concatenate([-self._missing, -stated @ known.x, np.zeros(len(bending))])
+        everything = Unknowns(machine, (*known.unknowns.members, *points))
+        begin, (low, high) = np.append(known.x, np.zeros(len(points))), everything.bounds
+        room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
+        x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
+        left = self._missing + straight @ (x - begin)
+        share = 1.0 - float(np.sum(left**2) / np.sum(self._missing**2))
+        return _Begun(_with_smoothing(everything, x), self._criterion(left, curves, bending), share)
 
-    def _criterion(self, left: Array, told: float) -> float:
+    def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
+        """Return a Bayesian criterion of what is left, (n,).
+
+        The points count as the parameters that the balances tell in spite of what is expected of
+        the second differences: the trace of the hat matrix.
+        """
         balances = left.reshape(-1, np.count_nonzero(self._evidence.fitted))
         squares = np.maximum(np.mean(balances**2, axis=0), 1.0)
         misfit = self._independent * float(np.sum(np.log(squares)))
-        return misfit + told * math.log(self._independent * squares.size)
+        told = curves.T @ curves
+        count = float(np.trace(np.linalg.pinv(told + bending.T @ bending) @ told))
+        return misfit + count * math.log(self._independent * squares.size)
 
 
-def _opened(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return bounds with room between them, which the solver wants."""
-    return low - ROUNDING, high + ROUNDING
+def _with_smoothing(unknowns: Unknowns, x: Array) -> Trial:
+    """Return the trial of a curve, where it is friction with the speed at which it turns round.
+
+    That lies between two windows of the balances.
+    """
+    if any(u.path.startswith("unnamed_force.friction.") for u in unknowns.members):
+        members = (*unknowns.members, _smoothing(unknowns.machine))
+        unknowns, x = Unknowns(unknowns.machine, members), np.append(x, 0.0)
+    return Trial((), unknowns, x, np.full((x.size, x.size), np.nan))
+
+
+def _smoothing(machine: Machine) -> Unknown:
+    about = quantities(machine.unnamed_force)[SMOOTHING]
+    usual = machine.unnamed_force.smoothing_speed
+    low, high = math.log(about.low / usual) + ROUNDING, math.log(about.high / usual) - ROUNDING
+    path = f"unnamed_force.{SMOOTHING}"
+    return Unknown(path, about.unit, usual, 1.0, low, high, 0.0, False, True)
 
 
 def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
@@ -271,15 +273,6 @@ def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
         Unknown(f"{kind.group}.{name}.{k}", about.unit, 0.0, size, low, high, 0.0, False)
         for k in range(POINTS)
     )
-
-
-def _smoothing(machine: Machine) -> Unknown:
-    """Return the speed at which friction turns round, between two windows of the balance."""
-    about = quantities(machine.unnamed_force)[SMOOTHING]
-    usual = machine.unnamed_force.smoothing_speed
-    low, high = math.log(about.low / usual) + ROUNDING, math.log(about.high / usual) - ROUNDING
-    path = f"unnamed_force.{SMOOTHING}"
-    return Unknown(path, about.unit, usual, 1.0, low, high, 0.0, False, True)
 
 
 def _ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:

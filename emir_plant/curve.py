@@ -9,7 +9,10 @@ ZERO = (0.0,) * POINTS
 
 
 class Place(NamedTuple):
-    """Where on a curve: behind which of its points, and by what share of the way to the next."""
+    """Where on a curve: behind which of its points, and by what share of the way to the next.
+
+    A share below 0 or above 1 is beyond the first or the last point.
+    """
 
     point: int
     share: float
@@ -17,11 +20,16 @@ class Place(NamedTuple):
 
 @compiled
 def place(signal: float, first: float, last: float) -> Place:
-    """Return where a signal is on a curve from its first to its last point, at an end beyond."""
+    """Return where a signal is on a curve that goes straight on beyond its ends."""
     position = (signal - first) / (last - first) * (POINTS - 1)
-    position = min(max(position, 0.0), POINTS - 1.0)
-    point = min(int(position), POINTS - 2)
+    point = int(min(max(position, 0.0), POINTS - 2.0))
     return Place(point, position - point)
+
+
+@compiled
+def place_within(signal: float, first: float, last: float) -> Place:
+    """Return where a signal is on a curve that stays beyond its ends as it is there."""
+    return place(min(max(signal, first), last), first, last)
 
 
 @compiled
@@ -32,9 +40,12 @@ def value(points: Any, at: Place) -> float:
     """
     k, t = at.point, at.share
     here, there = points[k], points[k + 1]
+    straight: float = here + t * (there - here)
+    if t < 0.0 or t > 1.0:
+        return straight
     before = points[k - 1] if k > 0 else 2.0 * here - there
     behind = points[k + 2] if k < POINTS - 2 else 2.0 * there - here
     start, end = 0.5 * (there - before), 0.5 * (behind - here)
-    bend = t * (1.0 - t) * ((1.0 - t) * (start - there + here) - t * (end - there + here))
-    result: float = here + t * (there - here) + bend
+    bent = (1.0 - t) * (start - there + here) - t * (end - there + here)
+    result: float = straight + t * (1.0 - t) * bent
     return result

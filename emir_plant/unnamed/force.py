@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from emir_common.quantity import quantity
-from emir_plant.curve import POINTS, ZERO, Place, place, value
+from emir_plant.curve import POINTS, ZERO, Place, place, place_within, value
 from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled
 
@@ -13,10 +13,11 @@ STROKE, VELOCITY = 1, 2  # what the curve may run over
 
 @dataclass(frozen=True, kw_only=True)
 class UnnamedForce:
-    """Forces on the piston beside the oil's; beyond the ends of the curves they are as there.
+    """Forces on the piston beside the oil's.
 
-    along acts whatever the direction of motion, positive where it lifts; friction resists the
-    motion, as tanh(v / v_0) near standstill.
+    Beyond the ends of the curves they are as there over the stroke, go straight on over the
+    velocity. along acts whatever the direction of motion, positive where it lifts; friction
+    resists the motion, as tanh(v / v_0) near standstill.
     """
 
     over: int = quantity("1", 0, 2, "0 off, 1 over the stroke, 2 the velocity", default=0)
@@ -53,5 +54,6 @@ def friction(velocity: float, stroke: float, p: Any) -> float:
 
 @compiled
 def _place(velocity: float, stroke: float, p: Any) -> Place:
-    signal = stroke if p.unnamed_force_over == STROKE else velocity
-    return place(signal, p.unnamed_force_first, p.unnamed_force_last)
+    if p.unnamed_force_over == STROKE:
+        return place_within(stroke, p.unnamed_force_first, p.unnamed_force_last)
+    return place(velocity, p.unnamed_force_first, p.unnamed_force_last)

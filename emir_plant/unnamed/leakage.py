@@ -12,7 +12,7 @@ PRESSURE = 1  # what the curve runs over
 
 @dataclass(frozen=True, kw_only=True)
 class UnnamedLeakage:
-    """Flows out of the chambers; beyond the ends of the curves they are as there."""
+    """Flows out of the chambers; beyond the ends of the curves they go straight on."""
 
     over: int = quantity("1", 0, 1, "0 off, 1 over the chamber's own pressure", default=0)
     first: float = quantity("SI", 0.0, 1e8, "pressure, Pa", default=0.0)

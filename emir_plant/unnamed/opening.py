@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from emir_common.quantity import quantity
-from emir_plant.curve import POINTS, ZERO, place, value
+from emir_plant.curve import POINTS, ZERO, place, place_within, value
 from emir_plant.jit import compiled
 
 STROKE, OPENING = 1, 2  # what the curve may run over
@@ -12,7 +12,10 @@ STROKE, OPENING = 1, 2  # what the curve may run over
 
 @dataclass(frozen=True, kw_only=True)
 class UnnamedOpening:
-    """Relative change of the opening; beyond the ends of the curve it is as there."""
+    """Relative change of the opening.
+
+    Beyond the ends of the curve it is as there over the stroke, goes straight on over the opening.
+    """
 
     over: int = quantity("1", 0, 2, "0 off, 1 over the stroke, 2 the stated opening", default=0)
     first: float = quantity("SI", -10.0, 10.0, "stroke, m, or opening, 1", default=0.0)
@@ -27,6 +30,7 @@ def factor(opening: float, stroke: float, p: Any) -> float:
     """Return the opening over the stated one. stroke: of the piston, m."""
     if p.unnamed_opening_over == 0.0:
         return 1.0
-    signal = stroke if p.unnamed_opening_over == STROKE else opening
-    at = place(signal, p.unnamed_opening_first, p.unnamed_opening_last)
+    at = place(opening, p.unnamed_opening_first, p.unnamed_opening_last)
+    if p.unnamed_opening_over == STROKE:
+        at = place_within(stroke, p.unnamed_opening_first, p.unnamed_opening_last)
     return max(1.0 + value(p.unnamed_opening_change, at), 0.0)

@@ -43,8 +43,11 @@ class Quantity:
     def _check_each(self, name: str, values: Any) -> None:
         if not isinstance(values, list | tuple) or len(values) != self.count:
             raise ParameterError(f"{name} = {values!r}: not a list of {self.count} numbers")
-        for k, value in enumerate(values):
-            self._check_number(f"{name}.{k}", value)
+        # all at once where they are right: a machine has many of them and is made thousandfold
+        numbers = set(map(type, values)) <= {int, float} and math.isfinite(sum(values))
+        if not numbers or min(values) < self.low or max(values) > self.high:
+            for k, value in enumerate(values):
+                self._check_number(f"{name}.{k}", value)
 
     def _check_number(self, name: str, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float):

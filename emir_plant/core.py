@@ -21,7 +21,6 @@ from emir_plant.effects import (
     supply_pressure_droop,
     terms,
     valve_hysteresis,
-    vessel_compliance,
     viscous_friction,
 )
 from emir_plant.hydraulics import chambers, logic_block, valve
@@ -155,13 +154,13 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
     lifting = flow_lifting - leak_lifting - chambers.relief_flow(x[P_H], p)
     volume = chambers.volume_lifting(motion.stroke, p)
-    stiffness = terms.stiffness(x[P_H], volume, vessel_compliance.lifting(volume, p), p)
+    stiffness = terms.stiffness_lifting(x[P_H], volume, p)
     surplus = lifting - p.area_lifting * motion.velocity
     dx[P_H] = chambers.pressure_rate(surplus, volume, x[P_H], stiffness)
 
     lowering = flow_lowering - leak_lowering - chambers.relief_flow(x[P_S], p)
     volume = chambers.volume_lowering(motion.stroke, p)
-    stiffness = terms.stiffness(x[P_S], volume, vessel_compliance.lowering(volume, p), p)
+    stiffness = terms.stiffness_lowering(x[P_S], volume, p)
     surplus = lowering + p.area_lowering * motion.velocity
     dx[P_S] = chambers.pressure_rate(surplus, volume, x[P_S], stiffness)
 
@@ -272,10 +271,10 @@ def _settling_step(x: Array, p: Any) -> float:
         return math.inf
     stroke = _motion(x, p).stroke
     volume = chambers.volume_lifting(stroke, p)
-    oil = terms.stiffness(x[P_H], volume, vessel_compliance.lifting(volume, p), p)
+    oil = terms.stiffness_lifting(x[P_H], volume, p)
     stiffness = oil * p.area_lifting**2 / volume
     volume = chambers.volume_lowering(stroke, p)
-    oil = terms.stiffness(x[P_S], volume, vessel_compliance.lowering(volume, p), p)
+    oil = terms.stiffness_lowering(x[P_S], volume, p)
     stiffness += oil * p.area_lowering**2 / volume
     return SETTLING / backlash.settling_rate(stiffness, p)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from emir_common.quantity import check_ranges, quantity
 from emir_plant.effects import Effects
-from emir_plant.unnamed import UnnamedForce, UnnamedLeakage, UnnamedOpening
+from emir_plant.unnamed import UnnamedCompliance, UnnamedForce, UnnamedLeakage, UnnamedOpening
 
 GRAVITY = 9.81  # m/s^2
 RATED_PAYLOAD = 1500.0  # kg, paper 1
@@ -133,6 +133,7 @@ class Machine:
     unnamed_force: UnnamedForce = UnnamedForce()
     unnamed_opening: UnnamedOpening = UnnamedOpening()
     unnamed_leakage: UnnamedLeakage = UnnamedLeakage()
+    unnamed_compliance: UnnamedCompliance = UnnamedCompliance()
     effects: Effects = field(default_factory=Effects)
 
     def __post_init__(self) -> None:

@@ -24,7 +24,6 @@ from emir_plant.effects import (
     linkage_error,
     terms,
     valve_hysteresis,
-    vessel_compliance,
 )
 from emir_plant.hydraulics import chambers
 from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
@@ -80,10 +79,10 @@ def _swept(turned: float, measured: Array, p: Any) -> tuple[float, float]:
     stroke = linkage_error.stroke(measured[2], p)
     moved = linkage_error.lever_arm(measured[2], p) * turned
     volume = chambers.volume_lifting(stroke, p)
-    stiffness = terms.stiffness(measured[0], volume, vessel_compliance.lifting(volume, p), p)
+    stiffness = terms.stiffness_lifting(measured[0], volume, p)
     lifting = chambers.pressure_rate(-p.area_lifting * moved, volume, measured[0], stiffness)
     volume = chambers.volume_lowering(stroke, p)
-    stiffness = terms.stiffness(measured[1], volume, vessel_compliance.lowering(volume, p), p)
+    stiffness = terms.stiffness_lowering(measured[1], volume, p)
     lowering = chambers.pressure_rate(p.area_lowering * moved, volume, measured[1], stiffness)
     return lifting, lowering
 

@@ -38,7 +38,12 @@ AGAINST = {
     "own_pressure": ("the chamber's pressure, bar", 1e-5),
     "valve_opening": ("opening as stated", 1.0),
 }
-PART = {"N": ("force, kN", 1e-3), "1": ("change, %", 1e2), "m^3/s": ("flow, l/min", 6e4)}
+PART = {  # of a curve, by the unit of its points
+    "N": ("force, kN", 1e-3),
+    "1": ("change, %", 1e2),
+    "m^3/s": ("flow, l/min", 6e4),
+    "m^3/Pa": ("compliance, ml/bar", 1e11),
+}
 
 
 def free_runs_picture(findings: Findings, judged: Judged) -> Figure:

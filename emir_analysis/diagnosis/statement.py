@@ -7,13 +7,13 @@ import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, STROKE, Experiment
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.telling import movement
-from emir_analysis.diagnosis.unnamed import Curve
+from emir_analysis.diagnosis.unnamed import COLUMNS, Curve
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
@@ -21,8 +21,8 @@ PARTS = {  # of a curve, as they are called
     "along": "whatever the direction",
     "friction": "against the motion",
     "change": "of the opening as stated",
-    "lifting": "out of the lifting chamber",
-    "lowering": "out of the lowering chamber",
+    "lifting": "of the lifting chamber",
+    "lowering": "of the lowering chamber",
 }
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
@@ -126,13 +126,14 @@ def _measured(curve: Curve, judged: Judged) -> str:
 
 def _beyond(curve: Curve, judged: Judged) -> str:
     """Return that the judge recordings go where nothing was measured, if they do."""
-    if curve.over != STROKE:  # the others change little from one recording to another
+    columns = COLUMNS.get(curve.over)
+    if columns is None:  # no sensor shows it
         return ""
-    strokes = np.concatenate([e.outputs[:, 0] for e in judged.evidence.experiments])
-    outside = np.mean((strokes < curve.signal[0]) | (strokes > curve.signal[-1]))
+    signal = np.concatenate([e.outputs[:, columns] for e in judged.evidence.experiments])
+    outside = np.mean((signal < curve.signal[0]) | (signal > curve.signal[-1]))
     if outside < BEYOND:
         return ""
-    return f", of which {100 * outside:.0f} % lie beyond the strokes it was measured at"
+    return f", of which {100 * outside:.0f} % lie beyond what it was measured at"
 
 
 def _described(shape: Shape) -> str:

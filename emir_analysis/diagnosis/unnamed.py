@@ -24,7 +24,7 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
 from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
-from emir_plant.unnamed import UNNAMED, force, leakage, opening
+from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
 
 TOLD = 0.5  # share of the balances' squares from which on a curve is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
@@ -33,7 +33,7 @@ BENDING: Array = (
     np.diff(np.eye(POINTS), 2, axis=0) / BENT
 )  # (p - 2, p), of a curve in units of its size
 SMOOTHING = "smoothing_speed"
-STROKE_COLUMN, PRESSURES = 0, (1, 2)  # of an experiment's outputs
+COLUMNS = {"piston_stroke": [0], "own_pressure": [1, 2]}  # of an experiment's outputs
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class Kind:
     forms: tuple[tuple[str, ...], ...]
 
 
+EITHER_OR_BOTH = (("lifting",), ("lowering",), ("lifting", "lowering"))
 KINDS = (
     Kind(
         "unnamed_force",
@@ -68,13 +69,14 @@ KINDS = (
         "own_pressure",
         "Pa",
         leakage.PRESSURE,
-        (("lifting",), ("lowering",), ("lifting", "lowering")),
+        EITHER_OR_BOTH,
     ),
+    Kind("unnamed_compliance", "own_pressure", "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
 )
 
 
 CHAMBERS = {"lifting_chamber", "lowering_chamber"}
-SHOWN_BY = {"unnamed_force": {"force"}, "unnamed_opening": CHAMBERS, "unnamed_leakage": CHAMBERS}
+SHOWN_BY = dict.fromkeys(UNNAMED, CHAMBERS) | {"unnamed_force": {"force"}}
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,9 @@ class _Balances:
         flow = max(f for name, f in rms.items() if name in CHAMBERS and np.isfinite(f))
         if kind.group == "unnamed_leakage":
             return float(flow)
+        if kind.group == "unnamed_compliance":
+            cylinder = self._known.machine.cylinder
+            return cylinder.volume_lifting_0 / cylinder.beta
         speed = self._evidence.signals()["piston_velocity"][1]
         swept = self._known.machine.cylinder.area_lifting * np.sqrt(np.mean(speed**2))
         return float(flow / swept)
@@ -282,8 +287,7 @@ def _ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:
     if kind.over == "valve_opening":
         most = max(float(np.abs(e.commands).max()) for e in evidence.experiments)
         return -most, most
-    columns = {"piston_stroke": (STROKE_COLUMN,), "own_pressure": PRESSURES}[kind.over]
-    outputs = np.concatenate([e.outputs[:, columns] for e in evidence.experiments])
+    outputs = np.concatenate([e.outputs[:, COLUMNS[kind.over]] for e in evidence.experiments])
     about = quantities(UNNAMED[kind.group])["first"]
     ends = np.clip([np.nanmin(outputs), np.nanmax(outputs)], about.low, about.high)
     return float(ends[0]), float(ends[1])

@@ -20,6 +20,7 @@ from emir_plant.effects import (
     viscous_friction,
 )
 from emir_plant.jit import compiled
+from emir_plant.unnamed import compliance as unnamed_compliance
 from emir_plant.unnamed import force as unnamed_force
 from emir_plant.unnamed import leakage as unnamed_leakage
 from emir_plant.unnamed import opening as unnamed_opening
@@ -93,6 +94,22 @@ def stiffness(pressure: float, volume: float, compliance: float, p: Any) -> floa
     compliance: of its vessels beyond the stated stiffness, m^3/Pa.
     """
     return vessel_compliance.stiffness(entrained_air.stiffness(pressure, p), volume, compliance)
+
+
+@compiled
+def stiffness_lifting(pressure: float, volume: float, p: Any) -> float:
+    """Return the lifting chamber's stiffness, Pa, at its pressure, Pa, and volume, m^3."""
+    compliance = vessel_compliance.lifting(volume, p)
+    compliance += unnamed_compliance.taken_up(pressure, p.unnamed_compliance_lifting, p)
+    return stiffness(pressure, volume, compliance, p)
+
+
+@compiled
+def stiffness_lowering(pressure: float, volume: float, p: Any) -> float:
+    """Return the same of the lowering chamber."""
+    compliance = vessel_compliance.lowering(volume, p)
+    compliance += unnamed_compliance.taken_up(pressure, p.unnamed_compliance_lowering, p)
+    return stiffness(pressure, volume, compliance, p)
 
 
 @compiled

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.core import LOGIC, P_H, P_S, SPOOL, SPOOL_RATE
-from emir_plant.effects import REGISTRY, Effects, terms, vessel_compliance
+from emir_plant.effects import REGISTRY, Effects, terms
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled
@@ -158,11 +158,11 @@ def _write_actuator(
     lifting, lowering, drawn = _valve_flows(x, supply, p)
     leak_lifting, leak_lowering = terms.leakage(x[P_H], x[P_S], p)
     volume = chambers.volume_lifting(stroke, p)
-    stiffness = terms.stiffness(x[P_H], volume, vessel_compliance.lifting(volume, p), p)
+    stiffness = terms.stiffness_lifting(x[P_H], volume, p)
     surplus = lifting - leak_lifting - chambers.relief_flow(x[P_H], p) - p.area_lifting * velocity
     dx[P_H] = chambers.pressure_rate(surplus, volume, x[P_H], stiffness)
     volume = chambers.volume_lowering(stroke, p)
-    stiffness = terms.stiffness(x[P_S], volume, vessel_compliance.lowering(volume, p), p)
+    stiffness = terms.stiffness_lowering(x[P_S], volume, p)
     surplus = lowering - leak_lowering - chambers.relief_flow(x[P_S], p)
     surplus += p.area_lowering * velocity
     dx[P_S] = chambers.pressure_rate(surplus, volume, x[P_S], stiffness)

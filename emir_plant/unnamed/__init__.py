@@ -4,14 +4,22 @@ What a diagnosis cannot name it can still measure. With the curve the machine ca
 controlled and looked at; a name it has not. All are off by default.
 """
 
+from emir_plant.unnamed.compliance import UnnamedCompliance
 from emir_plant.unnamed.force import UnnamedForce
 from emir_plant.unnamed.leakage import UnnamedLeakage
 from emir_plant.unnamed.opening import UnnamedOpening
 
-__all__ = ["UNNAMED", "UnnamedForce", "UnnamedLeakage", "UnnamedOpening"]
+__all__ = [
+    "UNNAMED",
+    "UnnamedCompliance",
+    "UnnamedForce",
+    "UnnamedLeakage",
+    "UnnamedOpening",
+]
 
 UNNAMED = {  # groups of a machine's parameters, each on where its `over` is not 0
     "unnamed_force": UnnamedForce,
     "unnamed_opening": UnnamedOpening,
     "unnamed_leakage": UnnamedLeakage,
+    "unnamed_compliance": UnnamedCompliance,
 }

@@ -15,7 +15,7 @@ from emir_plant.plant import Plant
 from emir_plant.robot.actuators import machines
 from emir_plant.robot.sheet import robot
 from emir_plant.sheet import data, joint1, load_sheet
-from emir_plant.unnamed import UNNAMED, force, leakage, opening
+from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
 
 FORTY_FIVE = math.radians(45.0)
 T = {name: k for k, name in enumerate(Truth._fields)}
@@ -130,6 +130,15 @@ def test_a_straight_line_over_the_pressure_is_a_laminar_leak() -> None:
         curve = _plant(leakage.PRESSURE, (0.0, 3e7), "leakage", **ours)
         theirs = _run(_with(**{f"external_leakage__{size}": 2e-12}))
         assert (np.abs(_run(curve) - theirs).max(axis=0) <= 1e-9 * np.ptp(theirs, axis=0)).all()
+
+
+def test_the_same_compliance_at_all_pressures_is_that_of_a_vessel() -> None:
+    ours = _plant(
+        compliance.PRESSURE, (0.0, 2e7), "compliance",
+        lifting=[1e-11] * POINTS, lowering=[2e-11] * POINTS,
+    )  # fmt: skip
+    theirs = _with(vessel_compliance__lifting=1e-11, vessel_compliance__lowering=2e-11)
+    assert _run(ours) == pytest.approx(_run(theirs), rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -96,9 +96,9 @@ class Evidence:
         return np.concatenate([balances.one_step(machine) for balances in self._balances])
 
     @property
-    def fastest(self) -> float:
-        """The piston's greatest speed, m/s."""
-        return max(float(np.abs(balances.velocity).max()) for balances in self._balances)
+    def velocity(self) -> Array:
+        """The piston's velocity, (n,) m/s, smoothed, one recording behind the other."""
+        return np.concatenate([balances.velocity for balances in self._balances])
 
     def check_like(self, other: "Evidence") -> None:
         """Raise InputError where these recordings lack a signal that others have."""

@@ -13,7 +13,7 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.telling import movement
-from emir_analysis.diagnosis.unnamed import COLUMNS, Curve
+from emir_analysis.diagnosis.unnamed import Curve, visited
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
@@ -126,10 +126,7 @@ def _measured(curve: Curve, judged: Judged) -> str:
 
 def _beyond(curve: Curve, judged: Judged) -> str:
     """Return that the judge recordings go where nothing was measured, if they do."""
-    columns = COLUMNS.get(curve.over)
-    if columns is None:  # no sensor shows it
-        return ""
-    signal = np.concatenate([e.outputs[:, columns] for e in judged.evidence.experiments])
+    signal = visited(curve.over, judged.evidence)
     outside = np.mean((signal < curve.signal[0]) | (signal > curve.signal[-1]))
     if outside < BEYOND:
         return ""

@@ -125,6 +125,18 @@ def curve(machine: Machine) -> Curve | None:
     return None
 
 
+def visited(over: str, evidence: Evidence) -> Array:
+    """Return where recordings were on a curve's signal, SI unit.
+
+    Of the opening the command tells, which is a little more.
+    """
+    if over == "piston_velocity":
+        return evidence.velocity
+    if over == "valve_opening":
+        return np.concatenate([e.commands for e in evidence.experiments])
+    return np.concatenate([e.outputs[:, COLUMNS[over]] for e in evidence.experiments])
+
+
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """Return a trial fitted to the free run of the recordings, first of their beginning.
 
@@ -282,12 +294,6 @@ def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
 
 def _ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:
     """Return the least and the greatest value, SI unit, that a curve's signal takes."""
-    if kind.over == "piston_velocity":
-        return -evidence.fastest, evidence.fastest
-    if kind.over == "valve_opening":
-        most = max(float(np.abs(e.commands).max()) for e in evidence.experiments)
-        return -most, most
-    outputs = np.concatenate([e.outputs[:, COLUMNS[kind.over]] for e in evidence.experiments])
-    about = quantities(UNNAMED[kind.group])["first"]
-    ends = np.clip([np.nanmin(outputs), np.nanmax(outputs)], about.low, about.high)
+    signal, about = visited(kind.over, evidence), quantities(UNNAMED[kind.group])["first"]
+    ends = np.clip([np.nanmin(signal), np.nanmax(signal)], about.low, about.high)
     return float(ends[0]), float(ends[1])

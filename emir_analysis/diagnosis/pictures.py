@@ -36,6 +36,7 @@ AGAINST = {
     "pressure_lowering": ("p_S, bar", 1e-5),
     "time": ("time, s", 1.0),
     "own_pressure": ("the chamber's pressure, bar", 1e-5),
+    "pressure_difference": ("p_H - p_S, bar", 1e-5),
     "valve_opening": ("opening as stated", 1.0),
 }
 PART = {  # of a curve, by the unit of its points

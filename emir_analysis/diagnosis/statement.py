@@ -23,6 +23,7 @@ PARTS = {  # of a curve, as they are called
     "change": "of the opening as stated",
     "lifting": "of the lifting chamber",
     "lowering": "of the lowering chamber",
+    "across": "across the piston",
 }
 TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 

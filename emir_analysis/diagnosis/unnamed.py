@@ -33,7 +33,7 @@ BENDING: Array = (
     np.diff(np.eye(POINTS), 2, axis=0) / BENT
 )  # (p - 2, p), of a curve in units of its size
 SMOOTHING = "smoothing_speed"
-COLUMNS = {"piston_stroke": [0], "own_pressure": [1, 2]}  # of an experiment's outputs
+STROKE, H, S = range(3)  # columns of an experiment's outputs
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class Kind:
     forms: tuple[tuple[str, ...], ...]
 
 
+DIFFERENCE = "pressure_difference"
 EITHER_OR_BOTH = (("lifting",), ("lowering",), ("lifting", "lowering"))
 KINDS = (
     Kind(
@@ -71,6 +72,7 @@ KINDS = (
         leakage.PRESSURE,
         EITHER_OR_BOTH,
     ),
+    Kind("unnamed_leakage", DIFFERENCE, "Pa", leakage.DIFFERENCE, (("across",),)),
     Kind("unnamed_compliance", "own_pressure", "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
 )
 
@@ -103,8 +105,7 @@ def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     not explained.
     """
     balances = _Balances(balanced, evidence, floor)
-    told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
-    begun = [s for kind in KINDS if SHOWN_BY[kind.group] & told for s in balances.begun(kind)]
+    begun = [start for kind in KINDS if _told(kind, evidence) for start in balances.begun(kind)]
     best = min(begun, key=lambda b: b.criterion, default=None)
     if best is None or best.share < TOLD:
         return None
@@ -125,6 +126,13 @@ def curve(machine: Machine) -> Curve | None:
     return None
 
 
+def _told(kind: Kind, evidence: Evidence) -> bool:
+    """Tell whether sensors show a kind's signal and a balance in which it acts."""
+    told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
+    shown = np.isfinite(visited(kind.over, evidence))
+    return bool(SHOWN_BY[kind.group] & told) and bool(np.any(shown))
+
+
 def visited(over: str, evidence: Evidence) -> Array:
     """Return where recordings were on a curve's signal, SI unit.
 
@@ -134,7 +142,10 @@ def visited(over: str, evidence: Evidence) -> Array:
         return evidence.velocity
     if over == "valve_opening":
         return np.concatenate([e.commands for e in evidence.experiments])
-    return np.concatenate([e.outputs[:, COLUMNS[over]] for e in evidence.experiments])
+    outputs = np.concatenate([e.outputs for e in evidence.experiments])
+    if over == DIFFERENCE:
+        return np.asarray(outputs[:, H] - outputs[:, S])
+    return outputs[:, [STROKE] if over == "piston_stroke" else [H, S]]
 
 
 def _fitted(start: Trial, evidence: Evidence) -> Trial:

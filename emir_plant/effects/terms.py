@@ -80,6 +80,7 @@ def has_dry_friction(p: Any) -> bool:
 def leakage(pressure_lifting: float, pressure_lowering: float, p: Any) -> tuple[float, float]:
     """Return the flows that leave the lifting and the lowering chamber, m^3/s; pressures in Pa."""
     across = internal_leakage.flow(pressure_lifting, pressure_lowering, p)
+    across += unnamed_leakage.across(pressure_lifting, pressure_lowering, p)
     lifting = external_leakage.flow(pressure_lifting, p.external_leakage_lifting, p)
     lowering = external_leakage.flow(pressure_lowering, p.external_leakage_lowering, p)
     lifting += unnamed_leakage.flow(pressure_lifting, p.unnamed_leakage_lifting, p)

@@ -132,6 +132,14 @@ def test_a_straight_line_over_the_pressure_is_a_laminar_leak() -> None:
         assert (np.abs(_run(curve) - theirs).max(axis=0) <= 1e-9 * np.ptp(theirs, axis=0)).all()
 
 
+def test_a_straight_line_over_the_difference_is_a_leak_past_the_piston() -> None:
+    ends = (0.0, 1e7)
+    flow = (3e-12 * np.linspace(*ends, POINTS)).tolist()
+    ours = _run(_plant(leakage.DIFFERENCE, ends, "leakage", across=flow))
+    theirs = _run(_with(internal_leakage__coefficient=3e-12))
+    assert (np.abs(ours - theirs).max(axis=0) <= 1e-9 * np.ptp(theirs, axis=0)).all()
+
+
 def test_the_same_compliance_at_all_pressures_is_that_of_a_vessel() -> None:
     ours = _plant(
         compliance.PRESSURE, (0.0, 2e7), "compliance",

@@ -78,7 +78,12 @@ KINDS = (
 
 
 CHAMBERS = {"lifting_chamber", "lowering_chamber"}
-SHOWN_BY = dict.fromkeys(UNNAMED, CHAMBERS) | {"unnamed_force": {"force"}}
+ACTS_IN = {  # balances, by list; the others act in both chambers
+    "along": {"force"},
+    "friction": {"force"},
+    "lifting": {"lifting_chamber"},
+    "lowering": {"lowering_chamber"},
+}
 
 
 @dataclass(frozen=True)
@@ -105,7 +110,7 @@ def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     not explained.
     """
     balances = _Balances(balanced, evidence, floor)
-    begun = [start for kind in KINDS if _told(kind, evidence) for start in balances.begun(kind)]
+    begun = [start for kind in KINDS for start in balances.begun(kind)]
     best = min(begun, key=lambda b: b.criterion, default=None)
     if best is None or best.share < TOLD:
         return None
@@ -126,11 +131,11 @@ def curve(machine: Machine) -> Curve | None:
     return None
 
 
-def _told(kind: Kind, evidence: Evidence) -> bool:
-    """Tell whether sensors show a kind's signal and a balance in which it acts."""
+def _told(form: tuple[str, ...], kind: Kind, evidence: Evidence) -> bool:
+    """Tell whether sensors show a kind's signal and all balances in which a form of it acts."""
     told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
-    shown = np.isfinite(visited(kind.over, evidence))
-    return bool(SHOWN_BY[kind.group] & told) and bool(np.any(shown))
+    needed = set().union(*(ACTS_IN.get(name, CHAMBERS) for name in form))
+    return needed <= told and bool(np.any(np.isfinite(visited(kind.over, evidence))))
 
 
 def visited(over: str, evidence: Evidence) -> Array:
@@ -203,15 +208,18 @@ class _Balances:
 
     def begun(self, kind: Kind) -> list[_Begun]:
         """Return trials with the smoothest curves that the balances allow, one for each form."""
+        forms = [form for form in kind.forms if _told(form, kind, self._evidence)]
+        if not forms:
+            return []
         first, last = _ends(kind, self._evidence)
         values = {"over": kind.code, "first": first, "last": last}
         named = {f"{kind.group}.{name}": value for name, value in values.items()}
         machine = with_values(self._known.machine, named)
-        names = dict.fromkeys(name for form in kind.forms for name in form)
+        names = dict.fromkeys(name for form in forms for name in form)
         members = {name: _points(kind, name, self._size(kind)) for name in names}
         slopes = {name: self._of_points(machine, points) for name, points in members.items()}
         found = []
-        for form in kind.forms:
+        for form in forms:
             points = tuple(u for name in form for u in members[name])
             found.append(self._smoothest(machine, points, [slopes[n] for n in form]))
         return found

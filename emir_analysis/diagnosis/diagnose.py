@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, fit_balances
+from emir_analysis.diagnosis.curves import Curve, curve
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.search import Progress, Search, Tried
 from emir_analysis.diagnosis.select import limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
-from emir_analysis.diagnosis.unnamed import Curve, curve, measured
+from emir_analysis.diagnosis.unnamed import measured
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet

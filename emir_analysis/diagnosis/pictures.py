@@ -5,11 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from emir_analysis.diagnosis.balances import BALANCES
+from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.statement import PARTS
-from emir_analysis.diagnosis.unnamed import Curve
 from emir_analysis.report import new_figure
 
 MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"

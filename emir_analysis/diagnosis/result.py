@@ -11,6 +11,7 @@ import numpy as np
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
+from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians, rms
@@ -24,7 +25,6 @@ from emir_analysis.diagnosis.statistics import (
     whiteness,
 )
 from emir_analysis.diagnosis.telling import untold
-from emir_analysis.diagnosis.unnamed import Curve
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities

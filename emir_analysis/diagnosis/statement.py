@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
@@ -13,7 +14,6 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.telling import movement
-from emir_analysis.diagnosis.unnamed import Curve, visited
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings

@@ -6,7 +6,7 @@ there, knows the curve as finely as the machine goes over it.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_run_problem
+from emir_analysis.diagnosis.curves import CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.select import EXPLAINED, excess
@@ -24,82 +25,13 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
 from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
-from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
+from emir_plant.unnamed import UNNAMED
 
 TOLD = 0.5  # share of the balances' squares from which on a curve is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
 MOST = 10.0  # times its size: a curve goes no further
-BENDING: Array = (
-    np.diff(np.eye(POINTS), 2, axis=0) / BENT
-)  # (p - 2, p), of a curve in units of its size
+BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve over its size
 SMOOTHING = "smoothing_speed"
-STROKE, H, S = range(3)  # columns of an experiment's outputs
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A curve, or several, that a machine may be given.
-
-    group: of the machine's parameters. over: name of the signal, code: the group's number for it.
-    forms: sets of the group's lists, of which the one is taken that the balances tell best.
-    """
-
-    group: str
-    over: str
-    unit: str
-    code: int
-    forms: tuple[tuple[str, ...], ...]
-
-
-DIFFERENCE = "pressure_difference"
-EITHER_OR_BOTH = (("lifting",), ("lowering",), ("lifting", "lowering"))
-KINDS = (
-    Kind(
-        "unnamed_force",
-        "piston_stroke",
-        "m",
-        force.STROKE,
-        (("along",), ("friction",), ("along", "friction")),
-    ),
-    # what turns round with the velocity is in a curve over it
-    Kind("unnamed_force", "piston_velocity", "m/s", force.VELOCITY, (("along",),)),
-    Kind("unnamed_opening", "piston_stroke", "m", opening.STROKE, (("change",),)),
-    Kind("unnamed_opening", "valve_opening", "1", opening.OPENING, (("change",),)),
-    Kind(
-        "unnamed_leakage",
-        "own_pressure",
-        "Pa",
-        leakage.PRESSURE,
-        EITHER_OR_BOTH,
-    ),
-    Kind("unnamed_leakage", DIFFERENCE, "Pa", leakage.DIFFERENCE, (("across",),)),
-    Kind("unnamed_compliance", "own_pressure", "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
-)
-
-
-CHAMBERS = {"lifting_chamber", "lowering_chamber"}
-ACTS_IN = {  # balances, by list; the others act in both chambers
-    "along": {"force"},
-    "friction": {"force"},
-    "lifting": {"lifting_chamber"},
-    "lowering": {"lowering_chamber"},
-}
-
-
-@dataclass(frozen=True)
-class Curve:
-    """What has no name, over a signal, (p,).
-
-    name: of the machine's parameter group. unit: of the signal. parts: the group's lists that are
-    not zero, (p,) each, part_unit: theirs.
-    """
-
-    name: str
-    over: str
-    unit: str
-    signal: tuple[float, ...]
-    part_unit: str
-    parts: dict[str, tuple[float, ...]]
 
 
 def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
@@ -116,41 +48,6 @@ def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
         return None
     found = _fitted(best.trial, evidence)
     return found if excess(found, evidence) <= EXPLAINED**2 - 1.0 else None
-
-
-def curve(machine: Machine) -> Curve | None:
-    """Return the curve that a machine has, if it has one."""
-    for kind in KINDS:
-        group = getattr(machine, kind.group)
-        if group.over == kind.code:
-            names = [n for n, about in quantities(group).items() if about.count]
-            parts = {name: getattr(group, name) for name in names if any(getattr(group, name))}
-            signal = tuple(map(float, np.linspace(group.first, group.last, POINTS)))
-            part_unit = quantities(group)[names[0]].unit
-            return Curve(kind.group, kind.over, kind.unit, signal, part_unit, parts)
-    return None
-
-
-def _told(form: tuple[str, ...], kind: Kind, evidence: Evidence) -> bool:
-    """Tell whether sensors show a kind's signal and all balances in which a form of it acts."""
-    told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
-    needed = set().union(*(ACTS_IN.get(name, CHAMBERS) for name in form))
-    return needed <= told and bool(np.any(np.isfinite(visited(kind.over, evidence))))
-
-
-def visited(over: str, evidence: Evidence) -> Array:
-    """Return where recordings were on a curve's signal, SI unit.
-
-    Of the opening the command tells, which is a little more.
-    """
-    if over == "piston_velocity":
-        return evidence.velocity
-    if over == "valve_opening":
-        return np.concatenate([e.commands for e in evidence.experiments])
-    outputs = np.concatenate([e.outputs for e in evidence.experiments])
-    if over == DIFFERENCE:
-        return np.asarray(outputs[:, H] - outputs[:, S])
-    return outputs[:, [STROKE] if over == "piston_stroke" else [H, S]]
 
 
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
@@ -208,10 +105,10 @@ class _Balances:
 
     def begun(self, kind: Kind) -> list[_Begun]:
         """Return trials with the smoothest curves that the balances allow, one for each form."""
-        forms = [form for form in kind.forms if _told(form, kind, self._evidence)]
+        forms = told_forms(kind, self._evidence)
         if not forms:
             return []
-        first, last = _ends(kind, self._evidence)
+        first, last = ends(kind, self._evidence)
         values = {"over": kind.code, "first": first, "last": last}
         named = {f"{kind.group}.{name}": value for name, value in values.items()}
         machine = with_values(self._known.machine, named)
@@ -309,10 +206,3 @@ def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
         Unknown(f"{kind.group}.{name}.{k}", about.unit, 0.0, size, low, high, 0.0, False)
         for k in range(POINTS)
     )
-
-
-def _ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:
-    """Return the least and the greatest value, SI unit, that a curve's signal takes."""
-    signal, about = visited(kind.over, evidence), quantities(UNNAMED[kind.group])["first"]
-    ends = np.clip([np.nanmin(signal), np.nanmax(signal)], about.low, about.high)
-    return float(ends[0]), float(ends[1])

@@ -53,24 +53,29 @@ def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """Return a trial fitted to the free run of the recordings, first of their beginning.
 
-    Where that tells the curves no more than the balances do, they stay smooth.
+    What that tells less than the balances do stays as they say.
     """
-    x, trial = np.append(start.x, np.zeros(2 * len(evidence.experiments))), start
+    begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
+    x, trial = begin, start
     for share in (*GROWING, 1.0):
-        solution = fit(_smoothly(free_run_problem(trial, evidence, x, share), trial), ACCURACY)
+        problem = free_run_problem(trial, evidence, x, share)
+        solution = fit(_smoothly(problem, trial, begin), ACCURACY)
         x, trial = solution.x, trial.continued(solution)
     return trial
 
 
-def _smoothly(problem: Problem, trial: Trial) -> Problem:
-    """Return a problem in which the curves' second differences are errors, too."""
+def _smoothly(problem: Problem, trial: Trial, begin: Array) -> Problem:
+    """Return a problem in which second differences of the curves' changes are errors, too.
+
+    begin: (k,) from where they change.
+    """
     lists = [u.path.rpartition(".")[0] for u in trial.unknowns.members]
     each = [np.flatnonzero(np.array(lists) == name) for name in dict.fromkeys(lists)]
-    unit = np.eye(problem.start.size)
+    unit = np.eye(begin.size)
     rows = np.vstack([BENDING @ unit[k] for k in each if k.size == POINTS])
 
     def smooth(model: Callable[[Array], Array]) -> Callable[[Array], Array]:
-        return lambda points: np.hstack([model(points), points @ rows.T])
+        return lambda points: np.hstack([model(points), (points - begin) @ rows.T])
 
     coarse = problem.coarse or problem.model
     return replace(problem, model=smooth(problem.model), coarse=smooth(coarse))

@@ -22,7 +22,7 @@ def declared(tree: Any) -> dict[str, tuple[Quantity, Any]]:
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """Return the tree with some quantities replaced, given by dotted path.
 
-    One number of a list is given by its place behind the list's path: `curve_lifting.3`.
+    One number of a list is given by its place behind the list's path: `unnamed_force.friction.3`.
 
     Raises ParameterError for a path that does not exist or a value out of range.
     """

@@ -8,9 +8,15 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
-from emir_common.quantity import check_ranges, quantity
+from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_plant.effects import Effects
-from emir_plant.unnamed import UnnamedCompliance, UnnamedForce, UnnamedLeakage, UnnamedOpening
+from emir_plant.unnamed import (
+    UNNAMED,
+    UnnamedCompliance,
+    UnnamedForce,
+    UnnamedLeakage,
+    UnnamedOpening,
+)
 
 GRAVITY = 9.81  # m/s^2
 RATED_PAYLOAD = 1500.0  # kg, paper 1
@@ -139,6 +145,12 @@ class Machine:
     def __post_init__(self) -> None:
         for path, group in groups(self).items():
             check_ranges(group, path + ".")
+        for name in UNNAMED:
+            curve = getattr(self, name)
+            if curve.over and curve.last <= curve.first:
+                raise ParameterError(
+                    f"{name}.last = {curve.last:g}: not above {name}.first = {curve.first:g}"
+                )
 
 
 def cautions(machine: Machine) -> list[str]:

@@ -156,6 +156,7 @@ def test_the_same_compliance_at_all_pressures_is_that_of_a_vessel() -> None:
         ("{friction: 1.0}", f"not a list of {POINTS} numbers"),
         (f"{{friction: {[-1.0] * POINTS}}}", r"friction.0 = -1: outside 0 ... "),
         (f"{{along: {['soft'] * POINTS}}}", r"along.0 = 'soft': not a number"),
+        ("{over: 1, first: 0.5, last: 0.5}", r"unnamed_force.last = 0.5: not above"),
         ("{over: 3}", r"unnamed_force.over = 3: outside 0 ... 2"),
     ],
 )

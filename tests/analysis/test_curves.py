@@ -1,0 +1,105 @@
+"""Which curves the sensors of a recording allow, and where they begin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import recorded
+
+from emir_analysis.diagnosis.balances import sensed
+from emir_analysis.diagnosis.candidates import fit_balances, trial
+from emir_analysis.diagnosis.curves import KINDS, Kind, curve, ends, told_forms
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.unnamed import measured
+from emir_common.parameter_tree import with_values
+from emir_plant.curve import POINTS
+from emir_plant.parameters import Machine
+from emir_plant.sheet import Sheet, joint1
+
+H, S = 1, 2  # columns of the outputs
+AT = np.linspace(0.3, 0.7, POINTS)
+SPRING = 3e4 * np.sin(20.0 * AT)  # N, a lifting force by the stroke
+
+
+def recording(machine: Machine) -> Experiment:
+    """Return a run of a machine as its sensors show it."""
+    commands = np.repeat(
+        recorded.moves(20.0, seed=6), round(recorded.COMMAND_PERIOD / COMMAND_STEP)
+    )
+    samples = commands.size // 10 + 1
+    empty = np.zeros(samples), np.zeros((samples, 4))
+    blank = Experiment("run", 10 * COMMAND_STEP, commands, *empty, 20)
+    return sensed(blank, machine, free_runs([machine], blank, [(0.8, 20e5)])[0])
+
+
+def without(experiment: Experiment, column: int, name: str) -> Experiment:
+    """Return the recording of a machine that lacks the sensor of an output."""
+    outputs = experiment.outputs.copy()
+    outputs[:, column] = np.nan
+    return replace(experiment, outputs=outputs, measured=experiment.measured - {name})
+
+
+@pytest.fixture(scope="module")
+def plain() -> Experiment:
+    return recording(joint1())
+
+
+def told(experiment: Experiment) -> set[tuple[str, str, tuple[str, ...]]]:
+    evidence = Evidence([experiment], joint1())
+    return {(k.group, k.over, form) for k in KINDS for form in told_forms(k, evidence)}
+
+
+def test_a_curve_wants_a_sensor_for_every_balance_in_which_it_acts(plain: Experiment) -> None:
+    everything = told(plain)
+    assert everything == {(k.group, k.over, form) for k in KINDS for form in k.forms}
+    lacking = told(without(plain, S, "pressure_lowering"))
+    assert lacking == {
+        ("unnamed_leakage", "own_pressure", ("lifting",)),
+        ("unnamed_compliance", "own_pressure", ("lifting",)),
+    }
+    neither = without(without(plain, S, "pressure_lowering"), H, "pressure_lifting")
+    assert told(neither) == set()
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.group}-{kind.over}")
+def test_a_curve_runs_over_where_the_recording_was(kind: Kind, plain: Experiment) -> None:
+    first, last = ends(kind, Evidence([plain], joint1()))
+    assert first < last
+    stroke, high, low = plain.outputs[:, 0], plain.outputs[:, H], plain.outputs[:, S]
+    expected = {
+        "piston_stroke": (stroke.min(), stroke.max()),
+        "own_pressure": (min(low.min(), high.min()), max(low.max(), high.max())),
+        "pressure_difference": ((high - low).min(), (high - low).max()),
+        "valve_opening": (plain.commands.min(), plain.commands.max()),
+    }
+    if kind.over in expected:
+        assert (first, last) == pytest.approx(expected[kind.over])
+
+
+def test_nothing_is_measured_in_a_machine_that_lacks_nothing(plain: Experiment) -> None:
+    evidence = Evidence([plain], joint1())
+    sheet = Sheet(joint1(), {"cylinder.beta": 0.1}, {}, ())
+    floor = evidence.floor(sheet.machine)
+    balanced = fit_balances(trial(sheet, ()), evidence, floor)
+    assert measured(balanced, evidence, floor) is None
+
+
+def test_a_force_by_the_stroke_is_measured() -> None:
+    """With a data sheet that tells everything, and with a tolerance."""
+    values = {"over": 1, "first": AT[0], "last": AT[-1], "along": SPRING.tolist()}
+    named = {f"unnamed_force.{name}": value for name, value in values.items()}
+    evidence = Evidence([recording(with_values(joint1(), named))], joint1())
+    for tolerances in ({}, {"cylinder.beta": 0.1}):
+        sheet = Sheet(joint1(), tolerances, {}, ())
+        floor = evidence.floor(sheet.machine)
+        found = measured(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
+        assert found is not None
+        shape = curve(found.machine)
+        assert shape is not None
+        assert (shape.name, shape.over, shape.parts.keys()) == (
+            "unnamed_force", "piston_stroke", {"along"},
+        )  # fmt: skip
+        law = 3e4 * np.sin(20.0 * np.array(shape.signal))
+        assert shape.parts["along"] == pytest.approx(law, abs=0.05 * 3e4)

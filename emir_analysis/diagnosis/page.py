@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from emir_analysis.diagnosis.balances import level
+from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
@@ -22,7 +23,7 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
 )
 from emir_analysis.diagnosis.select import quiet
-from emir_analysis.diagnosis.statement import TOLD
+from emir_analysis.diagnosis.statement import PARTS, TOLD
 from emir_analysis.diagnosis.summary import cautions
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
@@ -132,7 +133,9 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")
         )
     shape = result.shape
-    if shape is not None and findings.speaking is not None and shape.share > TOLD:
+    if result.curve is not None:
+        blocks += _curve(result.curve)
+    elif shape is not None and findings.speaking is not None and shape.share > TOLD:
         what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
         blocks.append(
             Table(
@@ -142,10 +145,20 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
                 f"({100 * shape.share:.0f} % of the variance in parts left out).",
             )
         )
-    if result.curve is not None:
-        caption = "What has no name, as a curve in the machine, fitted to the free run."
-        blocks.append(Picture(curve_picture(result.curve), caption))
     return blocks
+
+
+def _curve(curve: Curve) -> list[Block]:
+    """Return a picture of what has no name, and a table of every second of its points."""
+    rows = list(zip(curve.signal, *curve.parts.values(), strict=True))[::2]
+    heads = [f"{PARTS[name]}, {curve.part_unit}" for name in curve.parts]
+    return [
+        Picture(
+            curve_picture(curve),
+            f"What has no name, as a curve in the machine ({curve.name}), fitted to the free run.",
+        ),
+        Table((f"{curve.over}, {curve.unit}", *heads), rows, "The same in numbers."),
+    ]
 
 
 def _candidates(result: Diagnosis) -> list[Block]:

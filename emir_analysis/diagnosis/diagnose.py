@@ -75,6 +75,10 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if verdict == "unexplained" and speaking is not None:
         progress("measuring what has no name")
         with_curve = measured(search.balanced, evidence, search.floor)
+        if with_curve is None and chosen.effects:
+            progress(f"measuring what has no name beside: {chosen.name}")
+            beside = fit_balances(chosen, evidence, search.floor)
+            with_curve = measured(beside, evidence, search.floor)
         if with_curve is not None:
             final, after = with_curve, evidence.residuals([with_curve.machine])[0]
     return Findings(

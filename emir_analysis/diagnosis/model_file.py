@@ -22,9 +22,7 @@ def write_model(file: Path, machine: Machine, recording: str) -> None:
         if not getattr(machine, name).over:
             del groups[name]
     effects = {
-        name: _plain(effect)
-        for name, effect in vars(machine.effects).items()
-        if any(getattr(effect, size) for size in effect.sizes)
+        name: _plain(effect) for name, effect in vars(machine.effects).items() if effect.is_on
     }
     content = {"/**/plant_node": {"ros__parameters": groups | {"effects": effects}}}
     if not effects:

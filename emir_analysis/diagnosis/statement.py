@@ -106,7 +106,7 @@ def _surprised(findings: Findings, judged: Judged) -> bool:
 
 def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.curve is not None:
-        return _measured(findings.curve, judged)
+        return _measured(findings.curve, findings, judged)
     if findings.verdict == "unexplained" or not _surprised(findings, judged):
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
@@ -114,12 +114,15 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     return f"; but {judge}, {by}, shows more: diagnose from that too"
 
 
-def _measured(curve: Curve, judged: Judged) -> str:
+def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
+    effects = findings.chosen.machine.effects
+    on = [name for name in findings.rejected if getattr(effects, name).is_on]
+    beside = f" beside {' and '.join(on)}" if on else ""
     most = {PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
     unit = "" if curve.part_unit == "1" else f" {curve.part_unit}"
     sizes = " and ".join(f"up to {size:.3g}{unit} {text}" for text, size in most.items())
     return (
-        f"; measured as a curve, {curve.name} over {curve.over}, {sizes}, the free run of"
+        f"; measured as a curve{beside}, {curve.name} over {curve.over}, {sizes}, the free run of"
         f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
         f"{_beyond(curve, judged)}"
     )

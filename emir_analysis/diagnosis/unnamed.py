@@ -35,11 +35,11 @@ SMOOTHING = "smoothing_speed"
 
 
 def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
-    """Return a trial without effects, and what is missing as a curve in its machine.
+    """Return a trial that names no effects, and what is missing as a curve in its machine.
 
-    balanced: without it, fitted to the balances of the whole recordings. floor: (5,) of the
-    balances. None where no curve makes most of what they lack, or where with it the free run is
-    not explained.
+    balanced: without it, fitted to the balances of the whole recordings; effects that it has stay
+    in the machine. floor: (5,) of the balances. None where no curve makes most of what they lack,
+    or where with it the free run is not explained.
     """
     balances = _Balances(balanced, evidence, floor)
     begun = [start for kind in KINDS for start in balances.begun(kind)]

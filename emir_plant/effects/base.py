@@ -24,3 +24,8 @@ class Effect:
     source: ClassVar[str]
     trial: ClassVar[dict[str, float]]
     stepwise: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def is_on(self) -> bool:
+        """Tell whether any of its sizes switches it on."""
+        return any(getattr(self, size) != 0.0 for size in self.sizes)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.core import LOGIC, P_H, P_S, SPOOL, SPOOL_RATE
-from emir_plant.effects import REGISTRY, Effects, terms
+from emir_plant.effects import Effects, terms
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled
@@ -75,9 +75,8 @@ def machines(robot: Robot, reaches: tuple[Reach, ...]) -> tuple[Machine, ...]:
 
 
 def _check_effects(effects: Effects, allowed: tuple[str, ...], where: str) -> None:
-    for name, kind in REGISTRY.items():
-        on = any(getattr(getattr(effects, name), size) != 0.0 for size in kind.sizes)
-        if on and name not in allowed:
+    for name, effect in vars(effects).items():
+        if effect.is_on and name not in allowed:
             raise ParameterError(
                 f"{where}effects.{name}: not in the model of the whole robot; there are"
                 f" {', '.join(allowed)}"

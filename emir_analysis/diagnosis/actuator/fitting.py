@@ -243,7 +243,7 @@ def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unk
 
 def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) -> Array:
     stated = declared(known)
-    present = {e for e in effects if _is_on(known, e)}
+    present = {e for e in effects if getattr(known.effects, e).is_on}
     start = []
     for member in members:
         group, effect, *_ = member.path.split(".")
@@ -256,8 +256,3 @@ def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) 
 def _trial(path: str) -> float:
     _, effect, name = path.split(".")
     return REGISTRY[effect].trial[name]
-
-
-def _is_on(machine: Actuator, effect: str) -> bool:
-    members = getattr(machine.effects, effect)
-    return any(getattr(members, size) != 0.0 for size in members.sizes)

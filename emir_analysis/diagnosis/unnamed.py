@@ -5,7 +5,7 @@ there, knows the curve as finely as the machine goes over it.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -97,16 +97,19 @@ class _Balances:
 
     def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
         self._known, self._evidence, self._floor = known, evidence, floor
-        self._missing = self._left([known.machine])[0]
         steps = np.where(known.x + STEP > known.unknowns.bounds[1], -STEP, STEP)
-        moved = self._left([known.machine, *map(known.unknowns.at, known.x + np.diag(steps))])
-        self._slopes = np.nan_to_num(((moved[1:] - moved[0]) / steps[:, None]).T)
+        moved = map(known.unknowns.at, known.x + np.diag(steps))
+        left = evidence.residuals([known.machine, *moved])
+        self._rms = dict(zip(BALANCES, np.sqrt(np.mean(left[0] ** 2, axis=0)), strict=True))
+        missing = self._in_noise(left)
+        self._missing = missing[0]
+        self._slopes = np.nan_to_num(((missing[1:] - missing[0]) / steps[:, None]).T)
         self._independent = evidence.duration(1.0) / FORCE_WINDOW
 
-    def _left(self, machines: Sequence[Machine]) -> Array:
-        """Return what is missing in all balances, (m, n), in units of the noise."""
-        left = self._evidence.residuals(machines) / self._floor
-        return np.asarray(left[:, :, self._evidence.fitted].reshape(len(machines), -1))
+    def _in_noise(self, left: Array) -> Array:
+        """Return what is missing in each balance, (m, w, 5), as (m, n) in units of the noise."""
+        fitted = (left / self._floor)[:, :, self._evidence.fitted]
+        return np.asarray(fitted.reshape(len(left), -1))
 
     def begun(self, kind: Kind) -> list[_Begun]:
         """Return trials with the smoothest curves that the balances allow, one for each form."""
@@ -128,11 +131,9 @@ class _Balances:
 
     def _size(self, kind: Kind) -> float:
         """Return the size of what is missing, in the unit of a kind's curves."""
-        left = self._evidence.residuals([self._known.machine])[0]
-        rms = dict(zip(BALANCES, np.sqrt(np.mean(left**2, axis=0)), strict=True))
         if kind.group == "unnamed_force":
-            return float(rms["force"])
-        flow = max(f for name, f in rms.items() if name in CHAMBERS and np.isfinite(f))
+            return float(self._rms["force"])
+        flow = max(f for name, f in self._rms.items() if name in CHAMBERS and np.isfinite(f))
         if kind.group == "unnamed_leakage":
             return float(flow)
         if kind.group == "unnamed_compliance":
@@ -145,8 +146,8 @@ class _Balances:
     def _of_points(self, machine: Machine, points: tuple[Unknown, ...]) -> Array:
         """Return the slopes, (n, p), of what is missing by a curve's points."""
         alone = Unknowns(machine, points)
-        moved = self._left([alone.at(x) for x in np.eye(len(points))])
-        return np.asarray(np.nan_to_num((moved - self._missing).T))
+        moved = self._evidence.residuals([alone.at(x) for x in np.eye(len(points))])
+        return np.asarray(np.nan_to_num((self._in_noise(moved) - self._missing).T))
 
     def _smoothest(
         self, machine: Machine, points: tuple[Unknown, ...], slopes: list[Array]
@@ -171,8 +172,9 @@ class _Balances:
         return _Begun(_with_smoothing(everything, x), self._criterion(left, curves, bending), share)
 
     def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
-        """Return a Bayesian criterion of what is left, (n,).
+        """Return a Bayesian criterion of what is left, (n,), in units of the noise.
 
+        curves: (n, c p) slopes by the points of c curves, bending: their second differences.
         The points count as the parameters that the balances tell in spite of what is expected of
         the second differences: the trace of the hat matrix.
         """

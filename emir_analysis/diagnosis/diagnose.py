@@ -9,10 +9,11 @@ from emir_analysis.diagnosis.curves import Curve, curve
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.search import Progress, Search, Tried
-from emir_analysis.diagnosis.select import limits, quiet
+from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
-from emir_analysis.diagnosis.unnamed import measured
+from emir_analysis.diagnosis.unnamed import measured, measured_instead
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
@@ -67,20 +68,21 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
         refitted = final = search.whole(final)
+    with_curve = None
+    if verdict == "found" and not (at_noise(final, evidence) or sticks(final)):
+        progress("asking whether a curve says it better")
+        with_curve = measured_instead(final, search.balanced, evidence, search.floor)
+        if with_curve is not None:
+            verdict = "unexplained"
     if verdict == "unexplained":
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking = loudest(after, floor, limit)
     shape = None if speaking is None else _shape(evidence, after, speaking)
-    if verdict == "unexplained" and speaking is not None:
-        progress("measuring what has no name")
-        with_curve = measured(search.balanced, evidence, search.floor)
-        if with_curve is None and chosen.effects:
-            progress(f"measuring what has no name beside: {chosen.name}")
-            beside = fit_balances(chosen, evidence, search.floor)
-            with_curve = measured(beside, evidence, search.floor)
-        if with_curve is not None:
-            final, after = with_curve, evidence.residuals([with_curve.machine])[0]
+    if verdict == "unexplained" and speaking is not None and with_curve is None:
+        with_curve = _measured(chosen, search, evidence, progress)
+    if with_curve is not None:
+        final, after = with_curve, evidence.residuals([with_curve.machine])[0]
     return Findings(
         evidence=evidence,
         sheet=sheet,
@@ -97,6 +99,19 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         shape=shape,
         curve=curve(final.machine),
     )
+
+
+def _measured(
+    closest: Trial, search: Search, evidence: Evidence, progress: Progress
+) -> Trial | None:
+    """Return what no effect explains as a curve, beside the closest effects if need be."""
+    progress("measuring what has no name")
+    found = measured(search.balanced, evidence, search.floor)
+    if found is None and closest.effects:
+        progress(f"measuring what has no name beside: {closest.name}")
+        beside = fit_balances(closest, evidence, search.floor)
+        found = measured(beside, evidence, search.floor)
+    return found
 
 
 def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:

@@ -15,6 +15,7 @@ MUCH_LONGER = 10.0  # ... and times the usual gap, that of ...
 USUAL = 0.95  # of all
 FROZEN = 1.0  # s that a sensor with noise shows the same number
 OFTEN = 0.05  # share of readings that repeat the one before, where steps are coarse
+CLIPPED = 0.01  # share of readings that are the sensor's last
 WILD = 0.5  # of nearly the whole range, by which one reading is off both of its neighbours
 NEARLY_ALL = 0.99
 FAR_OFF = 20.0  # times its noise: the same of a signal that hardly moves
@@ -80,11 +81,18 @@ def check_command(name: str, command: Signal, begin: float, end: float, machine:
 
 
 def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine: Machine) -> None:
-    """Raise InputError for a sensor that shows single wild readings or freezes for a while.
+    """Raise InputError for a sensor that shows wild readings, freezes or comes to its end.
 
     angle: (n,) rad at times, (n,) s.
     """
     _check_wild(name, signal, machine)
+    for end in _ends(signal):
+        if _is_clipped(signal, end, np.interp(signal.time, time, angle), machine):
+            raise InputError(
+                f"{name}: {signal.name} goes no further than {end:.4g} while the boom moves: there"
+                " the sensor's range ends; record with one of a wider range, or leave it out of"
+                " the signal map"
+            )
     starts = np.flatnonzero(np.append(True, np.diff(signal.value) != 0.0))
     ends = np.append(starts[1:], signal.value.size) - 1
     for first, last in zip(starts.tolist(), ends.tolist(), strict=True):
@@ -111,6 +119,32 @@ def _check_wild(name: str, signal: Signal, machine: Machine) -> None:
             f" {value[k - 1]:.4g} before and {value[k + 1]:.4g} after; check the sensor's wiring"
             " and record again"
         )
+
+
+def _ends(signal: Signal) -> tuple[float, ...]:
+    """Return the readings at which the sensor, not the machine, may have come to an end.
+
+    A pressure's least is that of an empty chamber, an angle's are where the boom rests.
+    """
+    if signal.name not in NOISE:
+        return ()
+    highest, lowest = float(signal.value.max()), float(signal.value.min())
+    return (highest,) if signal.name.startswith("pressure") else (highest, lowest)
+
+
+def _is_clipped(signal: Signal, end: float, angle: Array, machine: Machine) -> bool:
+    """Tell whether a signal with noise shows its last number again and again while the boom moves.
+
+    angle: (n,) rad when the signal was measured.
+    """
+    at_end = signal.value == end
+    others = np.diff(signal.value[~at_end])
+    if others.size == 0 or np.mean(at_end) < CLIPPED or np.mean(others == 0.0) > OFTEN:
+        return False
+    bounds = np.flatnonzero(np.diff(at_end)) + 1
+    stretches = zip(np.split(at_end, bounds), np.split(angle, bounds), strict=True)
+    travel = sum(float(np.ptp(moved)) for inside, moved in stretches if inside[0])
+    return travel > LEAST_MOTION * machine.sensors.resolver_step
 
 
 def _is_frozen(  # noqa: PLR0913, PLR0917 (of one stretch of a recording)

@@ -45,22 +45,18 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
 
 
-def free_run_score(
-    trial: Trial, evidence: Evidence, seen: float = SEEN, unknowns: int | None = None
-) -> float:
+def free_run_score(trial: Trial, evidence: Evidence, seen: float = SEEN) -> float:
     """Score a trial on the free run's continuation behind the share that the fit has seen.
 
     Less error than the noise is no merit: a boom at rest shows one reading of the resolver, and
     which model is nearest to that is chance. seen: 0 for trials that were all fitted to the whole.
-    unknowns: that count, the trial's own when not given.
     """
     errors = free_run_errors(trial.machine, evidence)
     unseen = np.concatenate([error[int(seen * len(error)) :] for error in errors])
     if not np.all(np.isfinite(unseen)):
         return float("inf")
     channels = np.maximum(np.mean(unseen**2, axis=0), 1.0)
-    count = trial.x.size if unknowns is None else unknowns
-    return score(channels, evidence.duration(1.0 - seen) / BLOCK, count)
+    return score(channels, evidence.duration(1.0 - seen) / BLOCK, trial.x.size)
 
 
 def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:

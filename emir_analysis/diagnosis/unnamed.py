@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_ru
 from emir_analysis.diagnosis.curves import CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
-from emir_analysis.diagnosis.select import EXPLAINED, excess
+from emir_analysis.diagnosis.select import EXPLAINED, STRONG, excess, free_run_score
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -27,7 +27,7 @@ from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
 from emir_plant.unnamed import UNNAMED
 
-TOLD = 0.5  # share of the balances' squares from which on a curve is measured
+TOLD = 0.5  # share of the balances' squares above the noise from which on a curve is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
 MOST = 10.0  # times its size: a curve goes no further
 BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve over its size
@@ -41,13 +41,27 @@ def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     in the machine. floor: (5,) of the balances. None where no curve makes most of what they lack,
     or where with it the free run is not explained.
     """
-    balances = _Balances(balanced, evidence, floor)
-    begun = [start for kind in KINDS for start in balances.begun(kind)]
-    best = min(begun, key=lambda b: b.criterion, default=None)
+    best = _Balances(balanced, evidence, floor).best()
     if best is None or best.share < TOLD:
         return None
     found = _fitted(best.trial, evidence)
     return found if excess(found, evidence) <= EXPLAINED**2 - 1.0 else None
+
+
+def measured_instead(
+    named: Trial, balanced: Trial, evidence: Evidence, floor: Array
+) -> Trial | None:
+    """Return the same where a curve says clearly what effects only come near, each point counted.
+
+    named: with effects. balanced: without. A leak through a hole is near one in proportion to the
+    pressure in every balance, but not in the free run, which adds up what they hardly know of.
+    """
+    best = _Balances(balanced, evidence, floor).best()
+    if best is None:
+        return None
+    found = _fitted(best.trial, evidence)
+    limit = free_run_score(named, evidence, seen=0.0) - STRONG
+    return found if free_run_score(found, evidence, seen=0.0) < limit else None
 
 
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
@@ -111,7 +125,12 @@ class _Balances:
         fitted = (left / self._floor)[:, :, self._evidence.fitted]
         return np.asarray(fitted.reshape(len(left), -1))
 
-    def begun(self, kind: Kind) -> list[_Begun]:
+    def best(self) -> _Begun | None:
+        """Return the trial with a curve that the balances prefer, if there is any."""
+        begun = [start for kind in KINDS for start in self._begun(kind)]
+        return min(begun, key=lambda b: b.criterion, default=None)
+
+    def _begun(self, kind: Kind) -> list[_Begun]:
         """Return trials with the smoothest curves that the balances allow, one for each form."""
         forms = told_forms(kind, self._evidence)
         if not forms:
@@ -168,8 +187,9 @@ class _Balances:
         room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
         x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
         left = self._missing + straight @ (x - begin)
-        share = 1.0 - float(np.sum(left**2) / np.sum(self._missing**2))
-        return _Begun(_with_smoothing(everything, x), self._criterion(left, curves, bending), share)
+        share = 1.0 - _above_noise(left) / _above_noise(self._missing)
+        criterion = self._criterion(left, curves, bending)
+        return _Begun(_with_smoothing(everything, x), criterion, share)
 
     def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
         """Return a Bayesian criterion of what is left, (n,), in units of the noise.
@@ -184,6 +204,11 @@ class _Balances:
         told = curves.T @ curves
         count = float(np.trace(np.linalg.pinv(told + bending.T @ bending) @ told))
         return misfit + count * math.log(self._independent * squares.size)
+
+
+def _above_noise(left: Array) -> float:
+    """Return the squares of what is left, (n,), in units of the noise, above those of the noise."""
+    return max(float(np.sum(left**2 - 1.0)), 1.0)
 
 
 def _with_smoothing(unknowns: Unknowns, x: Array) -> Trial:

@@ -7,18 +7,19 @@ import pytest
 import recorded
 
 from emir_analysis.diagnosis.balances import sensed
-from emir_analysis.diagnosis.candidates import fit_balances, trial
+from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
 from emir_analysis.diagnosis.curves import KINDS, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.unnamed import measured
+from emir_analysis.diagnosis.unnamed import measured, measured_instead
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
 
 H, S = 1, 2  # columns of the outputs
+HOLE = 5e-8  # m^3/s over the root of Pa, from the lifting chamber to the tank
 AT = np.linspace(0.3, 0.7, POINTS)
 SPRING = 3e4 * np.sin(20.0 * AT)  # N, a lifting force by the stroke
 
@@ -103,3 +104,36 @@ def test_a_force_by_the_stroke_is_measured() -> None:
         )  # fmt: skip
         law = 3e4 * np.sin(20.0 * np.array(shape.signal))
         assert shape.parts["along"] == pytest.approx(law, abs=0.05 * 3e4)
+
+
+def test_a_curve_takes_the_place_of_an_effect_that_only_comes_near() -> None:
+    """A hole, whose flow goes with the root of the pressure, in place of a gap's."""
+    at = np.linspace(0.0, 2e7, POINTS)
+    values = {"over": 1, "first": at[0], "last": at[-1], "lifting": (HOLE * np.sqrt(at)).tolist()}
+    hole = with_values(joint1(), {f"unnamed_leakage.{name}": v for name, v in values.items()})
+    found = instead(hole, "external_leakage")
+    assert found is not None
+    shape = curve(found.machine)
+    assert shape is not None
+    assert (shape.name, shape.over, shape.parts.keys()) == (
+        "unnamed_leakage", "own_pressure", {"lifting"},
+    )  # fmt: skip
+    pressure = np.array(shape.signal)
+    often = (pressure > 9e6) & (pressure < 1.3e7)
+    law = HOLE * np.sqrt(pressure[often])
+    assert np.array(shape.parts["lifting"])[often] == pytest.approx(law, rel=0.05)
+
+
+def test_no_curve_takes_the_place_of_an_effect_that_is_there() -> None:
+    gap = {"effects.external_leakage.lifting": 5e-12}
+    assert instead(with_values(joint1(), gap), "external_leakage") is None
+
+
+def instead(machine: Machine, effect: str) -> Trial | None:
+    """Return what takes the place of an effect in the model of a machine."""
+    evidence = Evidence([recording(machine)], joint1())
+    sheet = Sheet(joint1(), {}, {}, ())
+    floor = evidence.floor(sheet.machine)
+    balanced = fit_balances(trial(sheet, ()), evidence, floor)
+    named = fit_free_run(fit_balances(trial(sheet, (effect,)), evidence, floor), evidence)
+    return measured_instead(named, balanced, evidence, floor)

@@ -230,7 +230,14 @@ def test_any_two_effects_go_together_in_either_order() -> None:
 
 
 @pytest.mark.parametrize(
-    "file", ["foreign.py", "foreign_more.py", "foreign_relatives.py", "foreign_forms.py"]
+    "file",
+    [
+        "foreign.py",
+        "foreign_more.py",
+        "foreign_third.py",
+        "foreign_relatives.py",
+        "foreign_forms.py",
+    ],
 )
 def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
     source = (Path(__file__).parent / file).read_text()

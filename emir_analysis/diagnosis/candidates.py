@@ -13,15 +13,15 @@ from itertools import product
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import PRESSURE_LOWERING, Experiment
+from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
@@ -208,12 +208,12 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole.
 
     In the end with slopes of the free run itself, over short steps: near the optimum the coarse
-    ones point a little beside it. Where no sensor shows p_S, the middle of what it may be at rest
+    ones point a little beside it. Where no sensor tells p_S, the middle of what it may be at rest
     is too far off to begin at. A hopeless trial is not polished.
     """
-    shown = PRESSURE_LOWERING in evidence.measured
     rest = [
-        np.zeros(2) if shown else _settled(known.machine, e, evidence) for e in evidence.experiments
+        np.zeros(2) if Starts(e, evidence).is_told else settled(known.machine, e, evidence)
+        for e in evidence.experiments
     ]
     x = np.concatenate([known.x, *rest])
     problem = free_run_problem(known, evidence, x)
@@ -237,7 +237,7 @@ def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 
         machines = [start.unknowns.at(x[:own]) for x in points]
         parts = []
         for k, (experiment, begin) in enumerate(zip(experiments, starts, strict=True)):
-            at = begin.at(points[:, own + 2 * k : own + 2 * k + 2])
+            at = begin.at(points[:, own + 2 * k : own + 2 * k + 2], machines)
             parts.append(_free_run_errors(machines, experiment, evidence, at, coarse=coarse))
         return np.concatenate(parts, axis=1)
 
@@ -251,46 +251,6 @@ def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 
         partial(model, coarse=True),
         SLOPE_STEP,
     )
-
-
-class Starts:
-    """States of rest at the start of a recording that the sensors leave open.
-
-    Two numbers from -1 to 1: the angle within the resolver's step and p_S within twice its noise,
-    or within what lets the boom rest where no sensor shows it.
-    """
-
-    def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
-        sensors = evidence.stated.sensors
-        angle, pressure = experiment.start()
-        half_step = 0.5 * sensors.resolver_step
-        half_range = 2.0 * sensors.pressure_noise
-        if np.isnan(pressure):
-            low, high = _resting_pressures(evidence.stated, angle)
-            pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)
-        self._middle = np.array([angle, pressure])
-        self._half = np.array([half_step, half_range])
-
-    def at(self, points: Array) -> list[tuple[float, float]]:
-        """Return angle, rad, and p_S, Pa, for (m, 2) numbers."""
-        return [(float(a), float(p)) for a, p in self._middle + self._half * points]
-
-
-def _resting_pressures(machine: Machine, angle: float) -> tuple[float, float]:
-    """Return between which p_S, Pa, a machine can rest at an angle, rad: half the pump's or less.
-
-    More is not left in a lowering chamber that was shut at standstill.
-    """
-    low, high = machine.supply.pT, 0.5 * machine.supply.p0
-    plant = Plant(machine)
-    for _ in range(5):
-        try:
-            plant.initial(angle, high)
-        except SimulationError:
-            high = 0.5 * (low + high)
-        else:
-            return low, high
-    return low, low
 
 
 def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
@@ -312,19 +272,18 @@ def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
 def coarse_errors(
     machines: Sequence[Machine],
     evidence: Evidence,
-    starts: Sequence[tuple[float, float]] | None = None,
+    rest: Sequence[Array] | None = None,
 ) -> Array:
     """Return weighted errors in units of the noise, (m, n), of coarse free runs of all recordings.
 
-    starts: angle, rad, and p_S, Pa, at rest in each recording; as the sensors show when not given.
+    rest: the two numbers of `Starts` in each recording; as the sensors show when not given.
     """
-    if starts is None:
-        middle = np.zeros((1, 2))
-        starts = [Starts(e, evidence).at(middle)[0] for e in evidence.experiments]
-    errors = [
-        _free_run_errors(machines, e, evidence, [start] * len(machines), coarse=True)
-        for e, start in zip(evidence.experiments, starts, strict=True)
-    ]
+    count = len(machines)
+    rest = [np.zeros(2)] * len(evidence.experiments) if rest is None else rest
+    errors = []
+    for experiment, point in zip(evidence.experiments, rest, strict=True):
+        at = Starts(experiment, evidence).at(np.tile(point, (count, 1)), machines)
+        errors.append(_free_run_errors(machines, experiment, evidence, at, coarse=True))
     return np.concatenate(errors, axis=1)
 
 
@@ -334,22 +293,23 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
     Inside what the sensors leave open at rest, those with the least error over the first seconds;
     the machine is left as it is.
     """
-    return Starts(experiment, evidence).at(_settled(machine, experiment, evidence)[None])[0]
+    settled_ = settled(machine, experiment, evidence)[None]
+    return Starts(experiment, evidence).at(settled_, [machine])[0]
 
 
-def _settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
+def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
     """Return the state `at_rest` as the two numbers of `Starts`.
 
-    Where no sensor shows p_S it may be anywhere, so the fit begins at the best of several.
+    Where no sensor tells p_S it may be anywhere, so the fit begins at the best of several.
     """
     early, starts = experiment.until(SETTLING), Starts(experiment, evidence)
 
     def model(points: Array) -> Array:
         machines = [machine] * len(points)
-        return _free_run_errors(machines, early, evidence, starts.at(points))
+        return _free_run_errors(machines, early, evidence, starts.at(points, machines))
 
     points = np.zeros((1, 2))
-    if PRESSURE_LOWERING not in evidence.measured:
+    if not starts.is_told:
         points = np.column_stack([np.zeros(RESTS), np.linspace(-1.0, 1.0, RESTS)])
     cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
     best: Array = points[int(np.argmin(cost))]

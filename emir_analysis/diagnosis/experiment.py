@@ -27,10 +27,11 @@ from emir_plant.record import record
 COMMAND = "valve_command"
 ANGLE = "joint_angle"
 STROKE = "piston_stroke"
+PRESSURE_LIFTING = "pressure_lifting"
 PRESSURE_LOWERING = "pressure_lowering"
 OUTPUTS = {  # what a free run is compared with, in this order, and its unit
     STROKE: "m",
-    "pressure_lifting": "Pa",
+    PRESSURE_LIFTING: "Pa",
     PRESSURE_LOWERING: "Pa",
     "tip_deflection_angle": "rad",
 }
@@ -126,13 +127,19 @@ class Experiment:
         """Return angle, rad, and p_S, Pa, at rest when the recording starts.
 
         The first reading, since a leak may let the boom sink by many steps of a fine resolver
-        before its first move, and where a line through the first samples begins: it moves p_S by
-        several times its noise. p_S is NaN where no sensor shows it.
+        before its first move. p_S is NaN where no sensor shows it.
         """
-        pressure = self.outputs[: self.rest, 2]
+        return float(self.angle[0]), self.pressure_at_rest(PRESSURE_LOWERING)
+
+    def pressure_at_rest(self, name: str) -> float:
+        """Return a pressure, Pa, when the recording starts; NaN where no sensor shows it.
+
+        Where a line through the first samples begins: a leak moves it by several times its noise.
+        """
+        pressure = self.outputs[: self.rest, list(OUTPUTS).index(name)]
         later = self.time[: self.rest] - self.time[: self.rest].mean()
         slope = later @ pressure / max(later @ later, self.period**2)
-        return float(self.angle[0]), float(pressure.mean() + slope * later[0])
+        return float(pressure.mean() + slope * later[0])
 
 
 def open_experiment(path: Path, signal_map: SignalMap, machine: Machine) -> Experiment:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, at_rest, coarse_errors, trial
+from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, coarse_errors, settled, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
@@ -206,10 +206,10 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     By the free run, for a known trial whose balances are quiet: the step that is best to first
     order promises too much far from there, so it is simulated, and shorter ones too.
     """
-    starts = [at_rest(known.machine, e, evidence) for e in evidence.experiments]
+    rest = [settled(known.machine, e, evidence) for e in evidence.experiments]
 
     def missing(trials: list[Trial]) -> Array:
-        return coarse_errors([t.machine for t in trials], evidence, starts)
+        return coarse_errors([t.machine for t in trials], evidence, rest)
 
     left = _Left(known, missing, SLOPE_STEP)
     told = evidence.told[FORCE]

@@ -51,6 +51,7 @@ LEFT = 1.03  # the same of all signals together, from which on a further effect 
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
+MOST_OTHERS = 2  # effects beside which is looked where nothing beside the best one suffices
 PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
@@ -118,7 +119,10 @@ class Search:
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
-        if not enough and np.any(self._evidence.fitted):
+        others = [] if enough or self._evidence.complete else self._beside_others(best)
+        if others:
+            equal = others
+        elif not enough and np.any(self._evidence.fitted):
             self._progress("pairs of effects")
             better = self._by_balances(self._pairs(plain, best), best)
             if better:
@@ -128,6 +132,23 @@ class Search:
                     equal, _ = self._by_beginning(equal, pair)
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else before.get(needed.effects, [needed])
+
+    def _beside_others(self, best: Tried) -> list[Trial]:
+        """Return the best trials beside another effect than the best one, if they suffice.
+
+        Where sensors are missing, the balances do not tell which of two the first to look beside
+        is, and the part held back knows little of it.
+        """
+        known = best.trial.effects[:1]
+        singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
+        others = [t for t in sorted(singles, key=_free) if t.trial.effects != known]
+        for other in others[:MOST_OTHERS]:
+            self._progress(f"all effects beside: {other.trial.name}")
+            better = self._beside(other)
+            found = _as_good(better) if better else []
+            if found and self._enough(self.whole(found[0])):
+                return found
+        return []
 
     def simplest(self, equal: list[Trial], better: list[Tried]) -> list[Trial]:
         """Return the best trials; one with fewer parameters where the whole knows nothing better.

@@ -1,0 +1,84 @@
+"""Where a free run may start: at rest, inside what the sensors leave open."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import PRESSURE_LIFTING, Experiment
+from emir_analysis.signals import Array
+from emir_plant.core import P_H
+from emir_plant.parameters import Machine
+from emir_plant.plant import Plant, SimulationError
+from emir_plant.sensors import undistorted
+
+
+class Starts:
+    """States of rest at the start of a recording that the sensors leave open.
+
+    Two numbers from -1 to 1: the angle within the resolver's step, and p_S within twice its noise;
+    where no sensor shows p_S, that with which the boom rests on p_H within twice its noise; where
+    none shows p_H either, p_S within what lets the boom rest.
+    """
+
+    def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
+        sensors = evidence.stated.sensors
+        angle, pressure = experiment.start()
+        half_step = 0.5 * sensors.resolver_step
+        half_range = 2.0 * sensors.pressure_noise
+        self._lifting, self._range = np.nan, (0.0, np.inf)
+        if np.isnan(pressure):
+            self._range = low, high = _resting_pressures(evidence.stated, angle)
+            pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)
+            self._lifting = experiment.pressure_at_rest(PRESSURE_LIFTING)
+            self._lifting_half = 2.0 * sensors.pressure_noise
+        self._middle = np.array([angle, pressure])
+        self._half = np.array([half_step, half_range])
+
+    @property
+    def is_told(self) -> bool:
+        """Tell whether a sensor shows p_S, or p_H, from which it follows."""
+        return self._range[1] == np.inf or not np.isnan(self._lifting)
+
+    def at(self, points: Array, machines: Sequence[Machine]) -> list[tuple[float, float]]:
+        """Return angle, rad, and p_S, Pa, for (m, 2) numbers and as many machines."""
+        told = [(float(a), float(p)) for a, p in self._middle + self._half * points]
+        if np.isnan(self._lifting):
+            return told
+        high = self._lifting + self._lifting_half * points[:, 1]
+        return [
+            (angle, self._below(machine, angle, float(p), otherwise))
+            for (angle, otherwise), p, machine in zip(told, high, machines, strict=True)
+        ]
+
+    def _below(self, machine: Machine, angle: float, lifting: float, otherwise: float) -> float:
+        """Return the p_S, Pa, with which a machine rests on a p_H, Pa, at an angle, rad.
+
+        As sensors show all of them. The other value where the machine cannot rest there.
+        """
+        plant, cylinder = Plant(machine), machine.cylinder
+        true_angle = undistorted(angle, "angle", machine)
+        try:
+            alone = float(plant.initial(true_angle, 0.0)[P_H])
+        except SimulationError:
+            return otherwise
+        more = undistorted(lifting, "pressure_lifting", machine) - alone
+        below = more * cylinder.area_lifting / cylinder.area_lowering
+        return float(np.clip(below, *self._range))
+
+
+def _resting_pressures(machine: Machine, angle: float) -> tuple[float, float]:
+    """Return between which p_S, Pa, a machine can rest at an angle, rad: half the pump's or less.
+
+    More is not left in a lowering chamber that was shut at standstill.
+    """
+    low, high = machine.supply.pT, 0.5 * machine.supply.p0
+    plant = Plant(machine)
+    for _ in range(5):
+        try:
+            plant.initial(angle, high)
+        except SimulationError:
+            high = 0.5 * (low + high)
+        else:
+            return low, high
+    return low, low

@@ -34,6 +34,7 @@ from emir_analysis.diagnosis.select import (
     quiet,
     speaks,
 )
+from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.signals import Array
@@ -131,6 +132,43 @@ def test_a_pressure_at_rest_that_no_sensor_shows_is_told_by_the_motion(pressure:
     experiment = without_p_s(run(machine, 12.0, pressure))
     found = at_rest(machine, experiment, Evidence([experiment], machine))[1]
     assert found == pytest.approx(pressure, abs=2.0 * machine.sensors.pressure_noise)
+
+
+@pytest.mark.parametrize("pressure", [12e5, 60e5])
+@pytest.mark.parametrize(
+    "missing",
+    [
+        {},
+        {"effects.payload.mass": 900.0},
+        {"effects.sensor_bias.pressure_lifting": 3e5, "effects.sensor_bias.angle": 0.02},
+    ],
+)
+def test_a_pressure_at_rest_that_no_sensor_shows_is_told_by_the_other(
+    pressure: float, missing: dict[str, float]
+) -> None:
+    """Forces are in balance there, in each machine that is tried, in its own way."""
+    machine = with_values(joint1(), missing)
+    experiment = without_p_s(run(machine, 10.0, pressure))
+    starts = Starts(experiment, Evidence([experiment], joint1()))
+    cylinder, rest = machine.cylinder, experiment.rest
+    line = 2.0 * machine.sensors.pressure_noise / math.sqrt(rest)  # where it begins
+    ratio = cylinder.area_lifting / cylinder.area_lowering
+    found = starts.at(np.zeros((1, 2)), [machine])[0][1]
+    assert abs(found - pressure) < 4.0 * ratio * line
+    another = with_values(machine, {"effects.payload.mass": 300.0})
+    angle = 0.8 - machine.effects.sensor_bias.angle
+    more = Plant(another).initial(angle, pressure)[0] - Plant(machine).initial(angle, pressure)[0]
+    other = starts.at(np.zeros((1, 2)), [another])[0][1]
+    assert other == pytest.approx(np.clip(found - ratio * more, 2e5, 1e7), abs=1e4)
+
+
+def test_a_payload_is_found_though_no_sensor_shows_how_it_rests() -> None:
+    """Fitted without it, all parameters are led astray by the pressure that is then too high."""
+    missing = {"effects.payload.mass": 1500.0}
+    searched, _, _ = search(missing, without_p_s)
+    found = searched.run()[0]
+    assert found.effects == ("payload",)
+    assert found.machine.effects.payload.mass == pytest.approx(1500.0, rel=0.02)
 
 
 def test_a_balance_without_its_sensor_says_nothing() -> None:

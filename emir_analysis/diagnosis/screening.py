@@ -139,6 +139,7 @@ class _Candidate:
     def stepped(self, missing: Missing) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
 
+        Or at one of the sizes that are usual for it: first order says nothing of a large one.
         missing: trials -> (m, n), what they leave with their own parameters.
         """
         goal = self._with_parameters(self._reached)
@@ -146,7 +147,11 @@ class _Candidate:
         off = self._start.x.copy()  # the effects' shapes as in the goal, their sizes 0
         off[self._known :] = self._reached
         off[self._sizes()] = 0.0
-        ways = [self._start.at(np.clip(off + s * (goal.x - off), low, high)) for s in SHARES]
+        points = [off + s * (goal.x - off) for s in SHARES]
+        members = self._start.unknowns.members[self._known :]
+        known = self._start.x[: self._known]
+        points += [np.append(known, own) for own in _starts(self.effect, members, [], 1.0)]
+        ways = [self._start.at(np.clip(point, low, high)) for point in points]
         costs = [_soft(row) for row in missing(ways)]
         best = int(np.argmin(costs))
         return Screened(ways[best], costs[best])

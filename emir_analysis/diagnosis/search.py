@@ -137,12 +137,16 @@ class Search:
         """Return the best trials beside another effect than the best one, if they suffice.
 
         Where sensors are missing, the balances do not tell which of two the first to look beside
-        is, and the part held back knows little of it.
+        is, and the part held back knows little of it. That which says most to the balances comes
+        first, then those that are ahead in the free run.
         """
-        known = best.trial.effects[:1]
         singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
-        others = [t for t in sorted(singles, key=_free) if t.trial.effects != known]
-        for other in others[:MOST_OTHERS]:
+        singles = sorted(singles, key=lambda t: t.balances)[:1] + sorted(singles, key=_free)
+        others: dict[tuple[str, ...], Tried] = {}
+        for single in singles:
+            if single.trial.effects != best.trial.effects[:1]:
+                others.setdefault(single.trial.effects, single)
+        for other in list(others.values())[:MOST_OTHERS]:
             self._progress(f"all effects beside: {other.trial.name}")
             better = self._beside(other)
             found = _as_good(better) if better else []

@@ -293,8 +293,8 @@ def at_rest(machine: Machine, experiment: Experiment, evidence: Evidence) -> tup
     Inside what the sensors leave open at rest, those with the least error over the first seconds;
     the machine is left as it is.
     """
-    settled_ = settled(machine, experiment, evidence)[None]
-    return Starts(experiment, evidence).at(settled_, [machine])[0]
+    point = settled(machine, experiment, evidence)
+    return Starts(experiment, evidence).at(point[None], [machine])[0]
 
 
 def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:

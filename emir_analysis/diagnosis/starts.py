@@ -19,33 +19,29 @@ class Starts:
     Two numbers from -1 to 1: the angle within the resolver's step, and p_S within twice its noise;
     where no sensor shows p_S, that with which the boom rests on p_H within twice its noise; where
     none shows p_H either, p_S within what lets the boom rest.
+
+    is_told: a sensor shows p_S, or p_H, from which it follows.
     """
 
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
         sensors = evidence.stated.sensors
         angle, pressure = experiment.start()
-        half_step = 0.5 * sensors.resolver_step
-        half_range = 2.0 * sensors.pressure_noise
-        self._lifting, self._range = np.nan, (0.0, np.inf)
-        if np.isnan(pressure):
+        self._noise = half_range = 2.0 * sensors.pressure_noise
+        shown = not np.isnan(pressure)
+        self._lifting = np.nan if shown else experiment.pressure_at_rest(PRESSURE_LIFTING)
+        self.is_told = shown or not np.isnan(self._lifting)
+        if not shown:
             self._range = low, high = _resting_pressures(evidence.stated, angle)
             pressure, half_range = 0.5 * (low + high), 0.5 * (high - low)
-            self._lifting = experiment.pressure_at_rest(PRESSURE_LIFTING)
-            self._lifting_half = 2.0 * sensors.pressure_noise
         self._middle = np.array([angle, pressure])
-        self._half = np.array([half_step, half_range])
-
-    @property
-    def is_told(self) -> bool:
-        """Tell whether a sensor shows p_S, or p_H, from which it follows."""
-        return self._range[1] == np.inf or not np.isnan(self._lifting)
+        self._half = np.array([0.5 * sensors.resolver_step, half_range])
 
     def at(self, points: Array, machines: Sequence[Machine]) -> list[tuple[float, float]]:
         """Return angle, rad, and p_S, Pa, for (m, 2) numbers and as many machines."""
         told = [(float(a), float(p)) for a, p in self._middle + self._half * points]
         if np.isnan(self._lifting):
             return told
-        high = self._lifting + self._lifting_half * points[:, 1]
+        high = self._lifting + self._noise * points[:, 1]
         return [
             (angle, self._below(machine, angle, float(p), otherwise))
             for (angle, otherwise), p, machine in zip(told, high, machines, strict=True)

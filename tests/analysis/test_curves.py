@@ -8,7 +8,7 @@ import recorded
 
 from emir_analysis.diagnosis.balances import sensed
 from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
-from emir_analysis.diagnosis.curves import KINDS, Kind, curve, ends, told_forms
+from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
@@ -96,9 +96,7 @@ def test_a_force_by_the_stroke_is_measured() -> None:
         sheet = Sheet(joint1(), tolerances, {}, ())
         floor = evidence.floor(sheet.machine)
         found = measured(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
-        assert found is not None
-        shape = curve(found.machine)
-        assert shape is not None
+        shape = curve_of(found)
         assert (shape.name, shape.over, shape.parts.keys()) == (
             "unnamed_force", "piston_stroke", {"along"},
         )  # fmt: skip
@@ -111,10 +109,7 @@ def test_a_curve_takes_the_place_of_an_effect_that_only_comes_near() -> None:
     at = np.linspace(0.0, 2e7, POINTS)
     values = {"over": 1, "first": at[0], "last": at[-1], "lifting": (HOLE * np.sqrt(at)).tolist()}
     hole = with_values(joint1(), {f"unnamed_leakage.{name}": v for name, v in values.items()})
-    found = instead(hole, "external_leakage")
-    assert found is not None
-    shape = curve(found.machine)
-    assert shape is not None
+    shape = curve_of(instead(hole, "external_leakage"))
     assert (shape.name, shape.over, shape.parts.keys()) == (
         "unnamed_leakage", "own_pressure", {"lifting"},
     )  # fmt: skip
@@ -127,6 +122,14 @@ def test_a_curve_takes_the_place_of_an_effect_that_only_comes_near() -> None:
 def test_no_curve_takes_the_place_of_an_effect_that_is_there() -> None:
     gap = {"effects.external_leakage.lifting": 5e-12}
     assert instead(with_values(joint1(), gap), "external_leakage") is None
+
+
+def curve_of(found: Trial | None) -> Curve:
+    """Return the curve that was measured."""
+    assert found is not None
+    shape = curve(found.machine)
+    assert shape is not None
+    return shape
 
 
 def instead(machine: Machine, effect: str) -> Trial | None:

@@ -1,7 +1,6 @@
 """`emir run`: start the graph, wait for the machine's run to end, stop it, show its figures."""
 
 import argparse
-import gc
 import signal
 import subprocess
 import sys
@@ -92,7 +91,6 @@ def run_plan(plan: Plan, processes: str) -> int:
         with ros_arguments(plan) as ros:
             if processes == "one":
                 _run_in_one_process(plan, ros)
-                gc.collect()  # a node that still waits for that stays in the ROS graph
             else:
                 _run_in_many_processes(plan, ros)
     except (KeyboardInterrupt, ExternalShutdownException):
@@ -142,7 +140,7 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
     processes: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name in plan.nodes:
-            command = [sys.executable, "-P", "-m", f"emir_ros.{name}", *ros]
+            command = [sys.executable, "-P", "-m", "emir_ros.start", name, *ros]
             processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
         _wait_for_plant(processes)
     finally:

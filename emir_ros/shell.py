@@ -258,6 +258,15 @@ class Shell(LifecycleNode):
     def close(self) -> None:
         """Bring to an end what must not be left half done."""
 
+    def destroy_node(self) -> None:
+        """Destroy the node and the machine of its states, without which it would stay alive.
+
+        rclpy leaves that to the end of the process, where the middleware's threads, still at work,
+        may lose what they use and crash it.
+        """
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
 
 def pressures(signals: Mapping[str, float]) -> dict[str, str]:
     """Return the measured pressures among the signals as texts with their unit."""

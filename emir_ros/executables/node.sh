@@ -5,4 +5,4 @@
 prefix=$(cd "$(dirname "$0")/../.." && pwd)
 python="$prefix/bin/python"
 [ -x "$python" ] || python=python3
-exec "$python" -P -m "emir_ros.$(basename "$0")" "$@"
+exec "$python" -P -m emir_ros.start "$(basename "$0")" "$@"

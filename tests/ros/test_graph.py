@@ -563,7 +563,7 @@ def _children(pid: int) -> Iterator[int]:
 
 def _child(parent: int, node: str) -> int:
     for pid in _children(parent):
-        if f"emir_ros.{node}" in Path(f"/proc/{pid}/cmdline").read_text():
+        if node in Path(f"/proc/{pid}/cmdline").read_text().split("\0"):
             return pid
     pytest.fail(f"{node} is not running")
 

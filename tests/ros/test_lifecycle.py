@@ -1,7 +1,9 @@
 """Nodes as lifecycle nodes: inactive ones do nothing, and deactivating shuts the valve."""
 
+import gc
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -76,4 +78,21 @@ def test_activated_and_deactivated_by_its_services() -> None:
     finally:
         for node in nodes:
             node.destroy_node()
+        rclpy.shutdown()
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="needs Linux's list of threads")
+def test_a_destroyed_node_leaves_no_threads_behind() -> None:
+    """As many as rclpy's own node: left at work, they may crash a process that ends."""
+
+    def left_by(make: Callable[[], Node]) -> int:
+        make().destroy_node()
+        return len(list(Path("/proc/self/task").iterdir()))
+
+    gc.collect()  # what a test before this one has left
+    rclpy.init()
+    try:
+        plain = left_by(lambda: Node("plain"))
+        assert left_by(CascadeNode) == plain
+    finally:
         rclpy.shutdown()

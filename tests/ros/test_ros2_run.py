@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,3 +106,15 @@ def test_node_starts_and_stops(
             process.kill()
     assert process.returncode == 0, said.read_text()
     assert "Traceback" not in said.read_text()
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=lambda s: str(s.name))
+def test_told_to_stop_while_it_loads(stop: signal.Signals, tmp_path: Path) -> None:
+    slow = tmp_path / "numpy.py"  # in place of what every node loads
+    slow.write_text(f"import signal\nsignal.raise_signal({int(stop)})\n")
+    command = [sys.executable, "-m", "emir_ros.start", "plant_node"]
+    here = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False, env=here
+    )
+    assert (finished.returncode, finished.stderr) == (0, "")

@@ -8,12 +8,12 @@ runs as fast as it can and the result does not depend on how fast that is.
 import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.task import Future
 
@@ -34,7 +34,8 @@ from emir_msgs_py.topics import (
 )
 from emir_plant.plant import SimulationError
 from emir_ros import qos
-from emir_ros.diagnostics import Beat, Diagnostics, Level
+from emir_ros.diagnostics import REPEAT, Beat, Diagnostics, Level
+from emir_ros.input_watch import InputWatch
 from emir_ros.node_parameters import declare
 from emir_ros.orders import Orders
 from emir_ros.wire import Wire, sender, stamp_ns
@@ -119,49 +120,44 @@ class Shell(LifecycleNode):
         return publish
 
     def _publisher(self, topic: Topic) -> Any:
-        def late(_: Any) -> None:
-            self.diagnostics.counts[f"{topic.name}: own deadline missed"] += 1
-
         return self.create_publisher(
             conversions.message_class(topic.type),
             topic.name,
             qos.promised(topic, lockstep=self.lockstep),
-            event_callbacks=None if self.lockstep else PublisherEventCallbacks(deadline=late),
             qos_overriding_options=qos.overridable(lockstep=self.lockstep),
         )
 
     def hear(self, topic: Topic, receive: Callable[[bytes], None], profile: "QoSProfile") -> Any:
-        """Subscribe to a topic's messages as bytes; counts who comes and goes, and deadlines."""
+        """Subscribe to a topic's messages as bytes; in real time, the input is watched."""
+        watch: InputWatch | None = None
 
         def take(data: bytes) -> None:
             if not self.active:
                 return
+            if watch is not None:
+                watch.tick()
             try:  # not `_keep_failure`: this is done for every message
                 receive(data)
             except FAILURES as error:
                 self._fail(error)
 
-        def late(_: Any) -> None:
-            self.diagnostics.counts[f"{topic.name}: deadline missed"] += 1
-
-        def alive(change: Any) -> None:
-            if change.not_alive_count_change > 0:
-                self.diagnostics.counts[f"{topic.name}: publisher not alive"] += 1
-
-        def matched(change: Any) -> None:
-            if change.current_count_change < 0:
-                self.diagnostics.counts[f"{topic.name}: publisher lost"] += 1
-
-        events = SubscriptionEventCallbacks(deadline=late, liveliness=alive, matched=matched)
-        return super().create_subscription(
+        subscription = super().create_subscription(
             conversions.message_class(topic.type),
             topic.name,
             take,
             profile,
-            event_callbacks=None if self.lockstep else events,
             qos_overriding_options=qos.overridable(lockstep=self.lockstep),
             raw=True,
         )
+        if not self.lockstep:
+            watch = self._watch_input(topic, subscription.qos_profile.deadline.nanoseconds * 1e-9)
+        return subscription
+
+    def _watch_input(self, topic: Topic, deadline: float) -> InputWatch:
+        publishers = partial(self.count_publishers, topic.name)
+        watch = InputWatch(topic.name, deadline, self.diagnostics.counts, self.seconds, publishers)
+        self.start_timer(REPEAT, watch.look)
+        return watch
 
     @property
     def subscriptions(self) -> Iterator[Any]:

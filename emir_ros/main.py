@@ -28,6 +28,7 @@ except ImportError:  # an older Jazzy: everything works, but slower
 LOOK_PERIOD = 0.1  # s, between two looks at whether to stop
 QUIET = 0.2  # s without a message, after which all that was sent counts as received
 LONGEST_REST = 5.0  # s that is waited for that
+LONGEST_END = 10  # s to the end of the process, once nothing is left that could be lost
 
 
 class StopRequest:
@@ -113,7 +114,8 @@ def take_the_rest(executor: Any, *nodes: Shell) -> None:
 def run(node_class: Callable[[], Shell]) -> None:
     """Run one node until it is done or told to stop by SIGINT or SIGTERM, then exit.
 
-    Exit code 0; 1 with one line on standard error for a bad parameter or a node that failed.
+    Exit code 0; 1 with one line on standard error for a bad parameter or a node that failed. A
+    process that the middleware does not let end is ended by SIGALRM.
     """
     sys.exit(_run(node_class))
 
@@ -138,6 +140,8 @@ def _run(node_class: Callable[[], Shell]) -> int:
     finally:
         if node is not None:
             node.close()
+            # Where many nodes end at once, Fast DDS may wait for its own thread, and never get it.
+            signal.alarm(LONGEST_END)
             node.destroy_node()
         rclpy.try_shutdown()
     return 0

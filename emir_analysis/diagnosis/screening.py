@@ -180,29 +180,36 @@ class _Candidate:
         return [self._start.at(np.append(known, x)) for x in points]
 
 
-def screen(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
-    """Return the known trial with each further effect of the registry, the best first.
+class OnBalances:
+    """A known trial with each further effect of the registry, begun on the balances."""
 
-    An effect that does not stay on is not in the list.
-    """
-    left = _Left(known, _in_balances(evidence, floor), STEP)
-    return _fitted(_begun(known, sheet, _by_balance(known, evidence), left))
+    def __init__(self, known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> None:
+        self._known, self._sheet = known, sheet
+        self._left = _Left(known, _in_balances(evidence, floor), STEP)
+        self._begun = _begun(known, sheet, _by_balance(known, evidence), self._left)
 
+    def singles(self) -> list[Screened]:
+        """Return the known trial with one further effect, the best first.
 
-def screen_pairs(known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> list[Screened]:
-    """Return the known trial with two further effects of the registry, the best first.
+        An effect that does not stay on is not in the list.
+        """
+        return _fitted(self._begun)
 
-    For two that help only together. Which pairs are fitted is decided to first order.
-    """
-    left = _Left(known, _in_balances(evidence, floor), STEP)
-    nothing = left.inside([known])[0][0]
-    begun = _begun(known, sheet, _by_balance(known, evidence), left)
-    pairs = sorted(combinations(begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing))
-    together = []
-    for one, other in pairs[:MOST_FITTED]:
-        start = trial(sheet, (*known.effects, one.effect, other.effect), known)
-        together.append(_Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
-    return _fitted(together)
+    def pairs(self) -> list[Screened]:
+        """Return the known trial with two further effects, the best first.
+
+        For two that help only together. Which pairs are fitted is decided to first order.
+        """
+        known, left = self._known, self._left
+        nothing = left.inside([known])[0][0]
+        pairs = sorted(
+            combinations(self._begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing)
+        )
+        together = []
+        for one, other in pairs[:MOST_FITTED]:
+            start = trial(self._sheet, (*known.effects, one.effect, other.effect), known)
+            together.append(_Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
+        return _fitted(together)
 
 
 def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:

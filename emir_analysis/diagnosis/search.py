@@ -28,7 +28,7 @@ from emir_analysis.diagnosis.friction_laws import (
     sticks,
     viscous_is_heard,
 )
-from emir_analysis.diagnosis.screening import Screened, screen, screen_free_run, screen_pairs
+from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
@@ -91,6 +91,7 @@ class Search:
         self._whole: dict[tuple[str, ...], Trial] = {}
         self._settled: tuple[str, ...] = ()  # effects that are known to be needed
         self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
+        self._beside_none: OnBalances | None = None
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
@@ -325,13 +326,22 @@ class Search:
         All to first order, and all beside the one effect that says most to the balances: the
         free run may be none the better for it while another effect drives it away.
         """
-        found = screen_pairs(plain.trial, self._sheet, self._head, self.floor)
+        found = self._on_balances(plain.trial).pairs()
         singles = [t for t in self.tried if len(t.trial.effects) == 1]
         first = min(singles, key=lambda t: t.balances, default=best)
         if first.trial.effects != best.trial.effects:
             told = fit_balances(first.trial, self._head, self.floor)
-            found += screen(told, self._sheet, self._head, self.floor)
+            found += self._on_balances(told).singles()
         return sorted(found, key=lambda s: s.cost)
+
+    def _on_balances(self, known: Trial) -> OnBalances:
+        """Return each effect begun beside a trial; beside none they are asked for twice."""
+        if not known.effects and self._beside_none is not None:
+            return self._beside_none
+        begun = OnBalances(known, self._sheet, self._head, self.floor)
+        if not known.effects:
+            self._beside_none = begun
+        return begun
 
     def _beside(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more.
@@ -342,7 +352,7 @@ class Search:
         """
         better = []
         if np.any(self._evidence.fitted):
-            found = screen(best.trial, self._sheet, self._head, self.floor)
+            found = self._on_balances(best.trial).singles()
             better = self._by_balances(found, best)
             near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
             told = near or self._evidence.complete

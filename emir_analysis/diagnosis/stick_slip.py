@@ -164,8 +164,8 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
         growths = GROWTHS if holds else GROWTHS[:-1]
         longer = _followed(known, evidence, fitted, time, end, growths)
         if longer > time:
-            part = evidence.until(longer)
-            fitted = _fitted(known, part, fitted.x, ACCURACY, method, fitted.curvature)
+            part, accuracy = evidence.until(longer), ACCURACY if longer == end else ROUGH
+            fitted = _fitted(known, part, fitted.x, accuracy, method, fitted.curvature)
         else:
             longer = _longer(growths[-1] * time, end)
             before = fitted.misfit

@@ -67,11 +67,13 @@ def measured_instead(
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """Return a trial fitted to the free run of the recordings, first of their beginning.
 
-    What that tells less than the balances do stays as they say.
+    That is left out where the balances' curve explains the whole. What the free run tells less
+    than they do stays as they say.
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
-    for share in (*GROWING, 1.0):
+    far = excess(start, evidence) > EXPLAINED**2 - 1.0
+    for share in (*(GROWING if far else ()), 1.0):
         problem = free_run_problem(trial, evidence, x, share)
         solution = fit(_smoothly(problem, trial, begin), ACCURACY)
         x, trial = solution.x, trial.continued(solution)

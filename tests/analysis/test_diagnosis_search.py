@@ -23,7 +23,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
-from emir_analysis.diagnosis.screening import screen
+from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
     SEEN,
@@ -261,7 +261,7 @@ def test_a_load_that_swings_about_a_mean_from_before_the_start_is_begun_so() -> 
         {f"effects.external_load.{name}": value for name, value in sizes.items()}
     )
     plain = fit_balances(trial(sheet, ()), evidence, searched.floor)
-    best = screen(plain, sheet, evidence, searched.floor)[0].trial
+    best = OnBalances(plain, sheet, evidence, searched.floor).singles()[0].trial
     assert best.effects == ("external_load",)
     load = best.machine.effects.external_load
     assert load.mean == pytest.approx(-600.0, rel=0.02)

@@ -12,7 +12,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.screening import _Left, screen, screen_pairs
+from emir_analysis.diagnosis.screening import OnBalances, _Left
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -113,7 +113,7 @@ def test_an_effect_that_shows_only_when_it_is_large_is_seen(size: float) -> None
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    first = screen(plain, sheet, evidence, floor)[0].trial
+    first = OnBalances(plain, sheet, evidence, floor).singles()[0].trial
     assert first.name == "supply_pressure_droop"
     found = first.machine.effects.supply_pressure_droop.resistance
     assert found == pytest.approx(resistance, rel=0.1)
@@ -131,7 +131,7 @@ def test_one_of_several_sizes_is_seen_where_another_hides_it(off: float) -> None
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    first = screen(plain, sheet, evidence, floor)[0].trial
+    first = OnBalances(plain, sheet, evidence, floor).singles()[0].trial
     assert first.name == "logic_block_fault"
     assert first.machine.effects.logic_block_fault.threshold == pytest.approx(off, rel=0.05)
 
@@ -148,8 +148,8 @@ def test_an_effect_is_not_promised_parameters_beyond_their_tolerances() -> None:
     tolerances = {"cylinder.beta": 0.15, "cylinder.volume_lifting_0": 0.1}
     sheet = Sheet(stated, tolerances, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    assert screen(plain, sheet, evidence, floor)[0].trial.name == "vessel_compliance"
-    first = screen_pairs(plain, sheet, evidence, floor)[0].trial
+    assert OnBalances(plain, sheet, evidence, floor).singles()[0].trial.name == "vessel_compliance"
+    first = OnBalances(plain, sheet, evidence, floor).pairs()[0].trial
     assert set(first.effects) == {"entrained_air", "vessel_compliance"}
 
 

@@ -132,10 +132,10 @@ class Shell(LifecycleNode):
         watch: InputWatch | None = None
 
         def take(data: bytes) -> None:
-            if not self.active:
-                return
             if watch is not None:
                 watch.tick()
+            if not self.active:
+                return
             try:  # not `_keep_failure`: this is done for every message
                 receive(data)
             except FAILURES as error:

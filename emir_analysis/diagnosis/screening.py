@@ -181,7 +181,10 @@ class _Candidate:
 
 
 class OnBalances:
-    """A known trial with each further effect of the registry, begun on the balances."""
+    """A known trial with each further effect of the registry, begun on the balances.
+
+    floor: (5,), what the sensors leave in each balance.
+    """
 
     def __init__(self, known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> None:
         self._known, self._sheet = known, sheet

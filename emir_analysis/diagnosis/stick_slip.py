@@ -48,7 +48,7 @@ DECIDED = 10.0  # s, of the beginning that chooses among laws
 LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-3  # relative, of the free run's squared error
-ROUGH = 1e-2  # the same of a fit that has to say only whether half of the rest is gone
+ROUGH = 1e-2  # the same of a fit to go on from, or to tell only whether half of the rest is gone
 
 Method = Callable[[Problem, float], Solution]
 
@@ -164,7 +164,8 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
         growths = GROWTHS if holds else GROWTHS[:-1]
         longer = _followed(known, evidence, fitted, time, end, growths)
         if longer > time:
-            part, accuracy = evidence.until(longer), ACCURACY if longer == end else ROUGH
+            part = evidence.until(longer)
+            accuracy = ACCURACY if longer == end else ROUGH
             fitted = _fitted(known, part, fitted.x, accuracy, method, fitted.curvature)
         else:
             longer = _longer(growths[-1] * time, end)

@@ -72,8 +72,8 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
-    far = excess(start, evidence) > EXPLAINED**2 - 1.0
-    for share in (*(GROWING if far else ()), 1.0):
+    near = excess(start, evidence) <= EXPLAINED**2 - 1.0
+    for share in (1.0,) if near else (*GROWING, 1.0):
         problem = free_run_problem(trial, evidence, x, share)
         solution = fit(_smoothly(problem, trial, begin), ACCURACY)
         x, trial = solution.x, trial.continued(solution)

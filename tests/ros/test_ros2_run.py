@@ -118,3 +118,41 @@ def test_told_to_stop_while_it_loads(stop: signal.Signals, tmp_path: Path) -> No
         command, capture_output=True, text=True, timeout=DEADLINE, check=False, env=here
     )
     assert (finished.returncode, finished.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("words", [[], ["shell"], ["no_node"]], ids=" ".join)
+def test_what_is_no_node_is_refused_in_one_line(words: list[str]) -> None:
+    command = [sys.executable, "-m", "emir_ros.start", *words]
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
+    assert finished.returncode == 1
+    assert finished.stderr.endswith("given, not the name of a node\n")
+    assert finished.stderr.count("\n") == 1
+
+
+STUCK = """
+import emir_ros.main
+from emir_ros.cascade_node import CascadeNode
+
+class Stuck(CascadeNode):
+    def __init__(self):
+        super().__init__()
+        self.end()
+
+    def destroy_node(self):
+        while True:
+            pass
+
+emir_ros.main.LONGEST_END = 1
+emir_ros.main.run(Stuck)
+"""
+
+
+def test_a_node_that_cannot_end_is_ended() -> None:
+    command = [sys.executable, "-c", STUCK]
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
+    assert finished.returncode == -signal.SIGALRM
+    assert "Traceback" not in finished.stderr

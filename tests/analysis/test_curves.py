@@ -1,17 +1,13 @@
 """Which curves the sensors of a recording allow, and where they begin."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-import recorded
+from operated import moved, without
 
-from emir_analysis.diagnosis.balances import sensed
 from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
 from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
-from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.unnamed import measured, measured_instead
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS
@@ -25,21 +21,7 @@ SPRING = 3e4 * np.sin(20.0 * AT)  # N, a lifting force by the stroke
 
 
 def recording(machine: Machine) -> Experiment:
-    """Return a run of a machine as its sensors show it."""
-    commands = np.repeat(
-        recorded.moves(20.0, seed=6), round(recorded.COMMAND_PERIOD / COMMAND_STEP)
-    )
-    samples = commands.size // 10 + 1
-    empty = np.zeros(samples), np.zeros((samples, 4))
-    blank = Experiment("run", 10 * COMMAND_STEP, commands, *empty, 20)
-    return sensed(blank, machine, free_runs([machine], blank, [(0.8, 20e5)])[0])
-
-
-def without(experiment: Experiment, column: int, name: str) -> Experiment:
-    """Return the recording of a machine that lacks the sensor of an output."""
-    outputs = experiment.outputs.copy()
-    outputs[:, column] = np.nan
-    return replace(experiment, outputs=outputs, measured=experiment.measured - {name})
+    return moved(machine, 20.0, seed=6)
 
 
 @pytest.fixture(scope="module")
@@ -55,12 +37,12 @@ def told(experiment: Experiment) -> set[tuple[str, str, tuple[str, ...]]]:
 def test_a_curve_wants_a_sensor_for_every_balance_in_which_it_acts(plain: Experiment) -> None:
     everything = told(plain)
     assert everything == {(k.group, k.over, form) for k in KINDS for form in k.forms}
-    lacking = told(without(plain, S, "pressure_lowering"))
+    lacking = told(without(plain, "pressure_lowering"))
     assert lacking == {
         ("unnamed_leakage", "own_pressure", ("lifting",)),
         ("unnamed_compliance", "own_pressure", ("lifting",)),
     }
-    neither = without(without(plain, S, "pressure_lowering"), H, "pressure_lifting")
+    neither = without(without(plain, "pressure_lowering"), "pressure_lifting")
     assert told(neither) == set()
 
 

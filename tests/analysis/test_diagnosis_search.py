@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import recorded
+from operated import moved, operated, without
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
@@ -20,7 +21,7 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.diagnose import loudest
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.screening import OnBalances
@@ -37,12 +38,10 @@ from emir_analysis.diagnosis.select import (
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
-from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.effects import vessel_compliance
-from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 from emir_plant.sheet import Sheet, joint1
 
@@ -51,30 +50,8 @@ FRICTION = {"effects.viscous_friction.coefficient": 1e5}  # N s/m
 SHIFT = {"effects.valve_null_offset.offset": 0.03}
 
 
-def run(machine: Machine, duration: float = 16.0, pressure: float = 20e5) -> Experiment:
-    """Return a run of a machine, from a p_S at rest, Pa, as its sensors show it."""
-    return operated(machine, recorded.moves(duration, seed=5), pressure)
-
-
-def operated(
-    machine: Machine, valve_command: Array, pressure: float = 20e5, angle: float = 0.8
-) -> Experiment:
-    """Return the same under a valve command, one value every 32 ms, from an angle, rad."""
-    commands = np.repeat(valve_command, round(recorded.COMMAND_PERIOD / COMMAND_STEP))
-    samples = commands.size // 10 + 1
-    empty = Experiment(
-        "run", 10 * COMMAND_STEP, commands, np.zeros(samples), np.zeros((samples, 4)), 20
-    )
-    return sensed(empty, machine, free_runs([machine], empty, [(angle, pressure)])[0])
-
-
 def without_p_s(experiment: Experiment) -> Experiment:
-    """Return an experiment whose p_S no sensor shows."""
-    outputs = experiment.outputs.copy()
-    outputs[:, 2] = np.nan
-    return replace(
-        experiment, outputs=outputs, measured=experiment.measured - {"pressure_lowering"}
-    )
+    return without(experiment, "pressure_lowering")
 
 
 def search(
@@ -82,7 +59,7 @@ def search(
 ) -> tuple[Search, Sheet, Evidence]:
     """Return the search for what a data sheet lacks, before its first round."""
     stated = joint1()
-    evidence = Evidence([seen(run(with_values(stated, missing)))], stated)
+    evidence = Evidence([seen(moved(with_values(stated, missing)))], stated)
     sheet = Sheet(stated, TOLERANCES, {}, ())
     return Search(evidence, sheet, lambda _: None), sheet, evidence
 
@@ -112,7 +89,7 @@ def test_the_angle_at_the_start_is_known_while_the_boom_sinks() -> None:
     leaky = {"effects.internal_leakage.coefficient": 2e-11, "sensors.resolver_bits": 19}
     machine = with_values(joint1(), leaky)
     step = machine.sensors.resolver_span / 2**machine.sensors.resolver_bits
-    experiment = run(machine, 2.0)
+    experiment = moved(machine, 2.0)
     assert np.ptp(experiment.angle[: experiment.rest]) > 4.0 * step
     assert abs(experiment.start()[0] - 0.8) <= 0.5 * step
 
@@ -129,7 +106,7 @@ def test_readings_that_stay_the_same_count_as_one() -> None:
 @pytest.mark.parametrize("pressure", [5e5, 12e5, 20e5, 50e5, 90e5])
 def test_a_pressure_at_rest_that_no_sensor_shows_is_told_by_the_motion(pressure: float) -> None:
     machine = joint1()
-    experiment = without_p_s(run(machine, 12.0, pressure))
+    experiment = without_p_s(moved(machine, 12.0, pressure))
     found = at_rest(machine, experiment, Evidence([experiment], machine))[1]
     assert found == pytest.approx(pressure, abs=2.0 * machine.sensors.pressure_noise)
 
@@ -148,7 +125,7 @@ def test_a_pressure_at_rest_that_no_sensor_shows_is_told_by_the_other(
 ) -> None:
     """Forces are in balance there, in each machine that is tried, in its own way."""
     machine = with_values(joint1(), missing)
-    experiment = without_p_s(run(machine, 10.0, pressure))
+    experiment = without_p_s(moved(machine, 10.0, pressure))
     starts = Starts(experiment, Evidence([experiment], joint1()))
     cylinder, rest = machine.cylinder, experiment.rest
     line = 2.0 * machine.sensors.pressure_noise / math.sqrt(rest)  # where it begins
@@ -174,7 +151,7 @@ def test_a_payload_is_found_though_no_sensor_shows_how_it_rests() -> None:
 def test_a_balance_without_its_sensor_says_nothing() -> None:
     """Neither of a machine that is far off: force, lowering chamber and bending need p_S."""
     stated = joint1()
-    evidence = Evidence([without_p_s(run(with_values(stated, FRICTION)))], stated)
+    evidence = Evidence([without_p_s(moved(with_values(stated, FRICTION)))], stated)
     left, floor = evidence.residuals([stated])[0], evidence.floor(stated)
     silent = [name in {"force", "lowering_chamber", "bending"} for name in BALANCES]
     assert np.all(np.isnan(left[:, silent]))
@@ -187,14 +164,14 @@ def test_the_noise_of_a_balance_is_that_of_a_machine_with_another_boom() -> None
     """A payload: what is missing counts in the stated machine's units, so does its noise."""
     stated = joint1()
     machine = with_values(stated, {"effects.payload.mass": 900.0})
-    evidence = Evidence([run(machine, 60.0)], stated)
+    evidence = Evidence([moved(machine, 60.0)], stated)
     left, floor = level(evidence.residuals([machine])[0]), evidence.floor(machine)
     assert left[:3] == pytest.approx(floor[:3], rel=0.15)
 
 
 def test_viscous_friction_is_kept_where_no_force_balance_tells_how_much_is_heard() -> None:
     stated = joint1()
-    evidence = Evidence([without_p_s(run(with_values(stated, FRICTION)))], stated)
+    evidence = Evidence([without_p_s(moved(with_values(stated, FRICTION)))], stated)
     found = trial(Sheet(stated, TOLERANCES, {}, ()), ("viscous_friction",))
     assert viscous_is_heard(found, evidence, evidence.floor(stated))
 
@@ -203,7 +180,7 @@ def test_a_stiff_boom_is_simulated_in_steps_that_stay_stable() -> None:
     """Its fastest mode, 250 Hz, is beyond what steps of 2 ms can follow."""
     stiff = with_values(joint1(), {"geometry.section_spring": 16.0 * 1.839e8})
     assert Plant(stiff).fastest > 2.8 / 2e-3
-    experiment = run(stiff, 6.0)
+    experiment = moved(stiff, 6.0)
     fine, coarse = (
         free_runs([stiff], experiment, [(0.8, 20e5)], coarse=each)[0] for each in (False, True)
     )
@@ -222,7 +199,7 @@ def test_a_tolerance_leads_no_further_than_a_machine_can_be_built() -> None:
 def test_less_error_than_the_noise_is_no_merit() -> None:
     """At rest the free run may stand anywhere in the resolver's step."""
     stated = joint1()
-    still = run(stated, 30.0).until(0.9)  # before the first move
+    still = moved(stated, 30.0).until(0.9)  # before the first move
     scores = []
     for part in (-0.45, 0.0, 0.45):
         shown = replace(still, angle=still.angle + part * stated.sensors.resolver_step)
@@ -273,7 +250,7 @@ def test_of_a_short_recording_a_balance_may_hold_more() -> None:
     """Of 12 independent windows the mean square of noise is above 2.74 once in a thousand."""
 
     def limit(duration: float) -> float:
-        return speaks(Evidence([run(joint1(), duration)], joint1()))
+        return speaks(Evidence([moved(joint1(), duration)], joint1()))
 
     assert limit(12.0) ** 2 == pytest.approx(2.74, abs=0.02)  # chi-square tables: 32.91 / 12
     assert limit(60.0) == pytest.approx(np.sqrt(2.0))
@@ -379,7 +356,7 @@ def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_
         "effects.vessel_compliance.lowering": 9.3e-11,
         "effects.valve_gain_asymmetry.lowering": -0.1,
     }
-    long = run(with_values(joint1(), hidden), duration=24.0)
+    long = moved(with_values(joint1(), hidden), duration=24.0)
     searched, _, _ = search({}, lambda _: long)
     found = searched.run()
     assert [t.effects for t in found] == [("vessel_compliance", "valve_gain_asymmetry")]

@@ -4,14 +4,11 @@ import math
 
 import numpy as np
 import pytest
-import recorded
+from operated import moved
 
-from emir_analysis.diagnosis.balances import sensed
 from emir_analysis.diagnosis.candidates import Trial, fit_balances, trial
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.fit import Problem, fit
-from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.screening import OnBalances, _Left
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
@@ -65,16 +62,6 @@ def test_parameters_that_do_their_best_stay_inside_their_bounds_to_the_last_digi
     assert on_bounds > 100
 
 
-def recorded_run(machine: Machine) -> Experiment:
-    """Return a run of a machine as its sensors show it."""
-    held = round(recorded.COMMAND_PERIOD / COMMAND_STEP)
-    commands = np.repeat(recorded.moves(16.0, seed=5), held)
-    period = 10 * COMMAND_STEP
-    samples = commands.size // 10 + 1
-    empty = Experiment("run", period, commands, np.zeros(samples), np.zeros((samples, 4)), 20)
-    return sensed(empty, machine, free_runs([machine], empty, [(0.8, 20e5)])[0])
-
-
 def similar(size: float) -> Machine:
     """Return a machine so many times as long as EMIR, at the same pressures, times and angles.
 
@@ -109,7 +96,7 @@ def test_an_effect_that_shows_only_when_it_is_large_is_seen(size: float) -> None
     """
     stated, resistance = similar(size), 1.9e10 / size**3
     droop = {"effects.supply_pressure_droop.resistance": resistance}
-    evidence = Evidence([recorded_run(with_values(stated, droop))], stated)
+    evidence = Evidence([moved(with_values(stated, droop))], stated)
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
@@ -127,7 +114,7 @@ def test_one_of_several_sizes_is_seen_where_another_hides_it(off: float) -> None
     """
     stated = joint1()
     spring = {"effects.logic_block_fault.threshold": off}
-    evidence = Evidence([recorded_run(with_values(stated, spring))], stated)
+    evidence = Evidence([moved(with_values(stated, spring))], stated)
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
@@ -143,7 +130,7 @@ def test_an_effect_is_not_promised_parameters_beyond_their_tolerances() -> None:
         "effects.entrained_air.share": 0.013,
         "effects.vessel_compliance.lifting": 2.25e-11,
     }
-    evidence = Evidence([recorded_run(with_values(stated, soft))], stated)
+    evidence = Evidence([moved(with_values(stated, soft))], stated)
     floor = evidence.floor(stated)
     tolerances = {"cylinder.beta": 0.15, "cylinder.volume_lifting_0": 0.1}
     sheet = Sheet(stated, tolerances, {}, ())

@@ -1,6 +1,7 @@
-"""Lets the tests of this folder import the browser that those of the analysis have."""
+"""Lets the tests of this folder import what they share, and the browser of the analysis' tests."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "analysis")]

@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.search import Progress, Search, Tried
 from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
+from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.unnamed import measured, measured_instead
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -28,8 +29,9 @@ class Findings:
     among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
     `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
-    the loudest balance that no effect takes down to the noise, shape: of its residual. curve:
-    what has no name, with which `chosen` and `after` then are.
+    the loudest balance that no effect takes down to the noise, shape: of its residual, swing: how
+    that swings with time, if it does. curve: what has no name, with which `chosen` and `after`
+    then are.
     """
 
     evidence: Evidence
@@ -45,6 +47,7 @@ class Findings:
     limit: Array
     speaking: str | None
     shape: Shape | None
+    swing: Swing | None
     curve: Curve | None
 
 
@@ -78,7 +81,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking = loudest(after, floor, limit)
-    shape = None if speaking is None else _shape(evidence, after, speaking)
+    shape, swings = _shape(evidence, after, speaking)
     if verdict == "unexplained" and speaking is not None and with_curve is None:
         with_curve = _measured(chosen, search, evidence, progress)
     if with_curve is not None:
@@ -97,6 +100,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         limit=limit,
         speaking=speaking,
         shape=shape,
+        swing=swings,
         curve=curve(final.machine),
     )
 
@@ -134,7 +138,19 @@ def loudest(residual: Array, floor: Array, limit: Array) -> str | None:
     return max(first or loud, key=loudness.__getitem__, default=None)
 
 
-def _shape(evidence: Evidence, residual: Array, speaking: str) -> Shape:
-    signals = evidence.signals()
+def _shape(
+    evidence: Evidence, residual: Array, speaking: str | None
+) -> tuple[Shape | None, Swing | None]:
+    """Return against what a balance speaks, and how that swings with time, if it does.
+
+    The first recording's: how long there was between two of them nobody knows.
+    """
+    if speaking is None:
+        return None, None
     column = list(BALANCES).index(speaking)
-    return best_shape(residual[:, column], signals["piston_velocity"][1], signals)
+    signals = evidence.signals()
+    time = signals.pop("time")[1]
+    shape = best_shape(residual[:, column], signals["piston_velocity"][1], signals)
+    first = slice(evidence.windows_of_first)
+    own = {name: (unit, values[first]) for name, (unit, values) in signals.items()}
+    return shape, swing(residual[first, column], time[first], own, shape)

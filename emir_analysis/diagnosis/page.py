@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.pictures import (
     curve_picture,
     free_runs_picture,
     shape_picture,
+    swing_picture,
 )
 from emir_analysis.diagnosis.result import (
     Diagnosis,
@@ -23,8 +24,10 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
 )
 from emir_analysis.diagnosis.select import quiet
-from emir_analysis.diagnosis.statement import PARTS, TOLD
+from emir_analysis.diagnosis.shape import TOLD
+from emir_analysis.diagnosis.statement import PARTS
 from emir_analysis.diagnosis.summary import cautions
+from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
 VERDICTS = {
@@ -135,6 +138,8 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
     shape = result.shape
     if result.curve is not None:
         blocks += _curve(result.curve)
+    elif result.swing is not None:
+        blocks += _swing(result.swing, findings, result)
     elif shape is not None and findings.speaking is not None and shape.share > TOLD:
         what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
         blocks.append(
@@ -146,6 +151,21 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             )
         )
     return blocks
+
+
+def _swing(swing: Swing, findings: Findings, result: Diagnosis) -> list[Block]:
+    """Return a picture of what swings with time, and a table of how much it does."""
+    name = findings.speaking or ""
+    unit = result.balances[name].unit
+    over = f"{swing.predictor}, {swing.unit}" if swing.predictor else "whatever the signals"
+    told = (
+        f"What is left in the balance {name} swings with a period of {swing.period:.3g} s "
+        f"({100 * swing.share:.0f} % of the variance in parts left out)."
+    )
+    return [
+        Picture(swing_picture(swing, findings), told),
+        Table((over, f"steady, {unit}", f"amplitude, {unit}"), swing.table, "The same in numbers."),
+    ]
 
 
 def _curve(curve: Curve) -> list[Block]:

@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.statement import PARTS
+from emir_analysis.diagnosis.swing import Swing, by_swing
 from emir_analysis.report import new_figure
 
 MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"
@@ -124,6 +125,27 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
     axes[0].set_ylabel(f"missing {label}")
     axes[0].legend(fontsize=8, loc="best")
     return figure, name
+
+
+def swing_picture(swing: Swing, findings: Findings) -> Figure:
+    """Show what is left in the loudest balance of the first recording, and how it swings."""
+    name = findings.speaking or ""
+    label, factor = SHOWN[name]
+    first = slice(findings.evidence.windows_of_first)
+    residual = findings.residuals["after"][first, list(BALANCES).index(name)]
+    time = findings.evidence.time[first]
+    signals = findings.evidence.signals()
+    values = signals[swing.predictor][1][first] if swing.predictor else np.zeros_like(time)
+    figure = new_figure(2.4)
+    ax = figure.subplots()
+    ax.plot(time, factor * residual, ".", ms=3, color=MEASURED, label="left over")
+    swung = by_swing(swing, residual, time, values)
+    ax.plot(time, factor * swung, color=FINAL, lw=1.0, label="as it swings")
+    ax.set_xlabel("time, s")
+    ax.set_ylabel(f"missing {label}")
+    ax.legend(fontsize=8, loc="best")
+    _tidy(ax)
+    return figure
 
 
 def curve_picture(curve: Curve) -> Figure:

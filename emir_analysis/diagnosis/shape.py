@@ -11,6 +11,7 @@ BINS = 15
 FEWEST = 3  # windows in a bin that count as a mean
 ALIKE = 0.02  # difference of two shares below which the simpler function is taken
 PARTS = 3  # of the recording; each is predicted from the others
+TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import STAGES, Judged
-from emir_analysis.diagnosis.shape import Shape
+from emir_analysis.diagnosis.shape import TOLD, Shape
+from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
 
 MANY = 0.1  # share of the samples
@@ -25,7 +26,6 @@ PARTS = {  # of a curve, as they are called
     "lowering": "of the lowering chamber",
     "across": "across the piston",
 }
-TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
 def verdict(findings: Findings, judged: Judged) -> str:
@@ -56,7 +56,7 @@ def _of_findings(findings: Findings) -> str:
             f" ({noise_share:.1f} times its noise)"
         )
         if findings.curve is None:
-            remainder += f"; {_described(shape)}"
+            remainder += f"; {_described(shape, findings.swing)}"
     if findings.verdict == "unexplained":
         rejected = " and ".join(findings.rejected)
         known = f"{rejected} comes closest but leaves too much; " if rejected else ""
@@ -137,7 +137,11 @@ def _beyond(curve: Curve, judged: Judged) -> str:
     return f", of which {100 * outside:.0f} % lie beyond what it was measured at"
 
 
-def _described(shape: Shape) -> str:
+def _described(shape: Shape, swing: Swing | None) -> str:
+    if swing is not None:
+        what = f"a function of {swing.predictor}" if swing.predictor else "something"
+        period, share = f"{swing.period:.3g} s", f"{100 * swing.share:.0f} %"
+        return f"{what} that swings with a period of {period} predicts {share} of it"
     if shape.share < TOLD:
         return "no single signal predicts it"
     direction = " and the direction of motion" if shape.by_direction else ""

@@ -29,9 +29,9 @@ class Findings:
     among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
     `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
-    the loudest balance that no effect takes down to the noise, shape: of its residual, swing: how
-    that swings with time, if it does. curve: what has no name, with which `chosen` and `after`
-    then are.
+    the balance that no effect takes down to the noise, the loudest or that which swings with
+    time, shape: of its residual, swing: how that swings. curve: what has no name, with which
+    `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -80,8 +80,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if verdict == "unexplained":
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
-    speaking = loudest(after, floor, limit)
-    shape, swings = _shape(evidence, after, speaking)
+    speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     if verdict == "unexplained" and speaking is not None and with_curve is None:
         with_curve = _measured(chosen, search, evidence, progress)
     if with_curve is not None:
@@ -127,30 +126,38 @@ def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:
 
 
 def loudest(residual: Array, floor: Array, limit: Array) -> str | None:
-    """Return the balance that is furthest above its noise, (5,), if one speaks: limit, (5,).
+    """Return the balance that is furthest above its noise, (5,), if one speaks: limit, (5,)."""
+    return next(iter(loud(residual, floor, limit)), None)
+
+
+def loud(residual: Array, floor: Array, limit: Array) -> list[str]:
+    """Return the balances that speak, that furthest above its noise first.
 
     A missing force bends the boom too, so the bending counts only where nothing else speaks.
     """
     left = level(residual)
     loudness = dict(zip(BALANCES, left / floor, strict=True))
-    loud = [name for name, over in zip(BALANCES, left > limit, strict=True) if over]
-    first = [name for name in loud if name != "bending"]
-    return max(first or loud, key=loudness.__getitem__, default=None)
+    speaking = [name for name, over in zip(BALANCES, left > limit, strict=True) if over]
+    first = [name for name in speaking if name != "bending"]
+    return sorted(first or speaking, key=loudness.__getitem__, reverse=True)
 
 
 def _shape(
-    evidence: Evidence, residual: Array, speaking: str | None
-) -> tuple[Shape | None, Swing | None]:
-    """Return against what a balance speaks, and how that swings with time, if it does.
+    evidence: Evidence, residual: Array, speaking: Sequence[str]
+) -> tuple[str | None, Shape | None, Swing | None]:
+    """Return the balance that says most of what is missing, against what, and how it swings.
 
-    The first recording's: how long there was between two of them nobody knows.
+    The first of those that speak that swings with time, else the loudest. Swings are the first
+    recording's: how long there was between two of them nobody knows.
     """
-    if speaking is None:
-        return None, None
-    column = list(BALANCES).index(speaking)
     signals = evidence.signals()
     time = signals.pop("time")[1]
-    shape = best_shape(residual[:, column], signals["piston_velocity"][1], signals)
     first = slice(evidence.windows_of_first)
     own = {name: (unit, values[first]) for name, (unit, values) in signals.items()}
-    return shape, swing(residual[first, column], time[first], own, shape)
+    found: list[tuple[str, Shape, Swing | None]] = []
+    for name in speaking:
+        left = residual[:, list(BALANCES).index(name)]
+        shape = best_shape(left, signals["piston_velocity"][1], signals)
+        found.append((name, shape, swing(left[first], time[first], own, shape)))
+    swinging = [each for each in found if each[2] is not None]
+    return next(iter([*swinging, *found]), (None, None, None))

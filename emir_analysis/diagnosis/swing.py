@@ -21,7 +21,7 @@ BINS = 5  # of a signal: each has three unknowns
 STEPS = 10  # frequencies in the width of a line, one over the recording's length
 HIGHEST = 1.5  # Hz; the balances' windows of half a second show little of what swings faster
 DOUBT = 1.0  # windows of no residual that each bin is taken to have seen besides
-TAKEN = 2.0 / 3.0  # least part of what no static function predicts that a swing has to
+TAKEN = 0.7  # least part of what no static function predicts that a swing has to
 
 
 @dataclass(frozen=True)

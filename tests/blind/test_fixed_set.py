@@ -10,7 +10,8 @@ from emir_analysis.blind.puzzle import KINDS
 from emir_analysis.blind.trial import Plan, trial
 from emir_analysis.cli import main
 
-FOREIGN = (Path(__file__).parent / "foreign.py").read_text()
+HERE = Path(__file__).parent
+FOREIGN, THIRD = [(HERE / name).read_text() for name in ("foreign.py", "foreign_third.py")]
 
 
 def test_edges_that_close_along_the_stroke_have_no_name_but_a_curve(tmp_path: Path) -> None:
@@ -42,3 +43,17 @@ def test_a_load_is_found_that_nobody_told_of(
     _, one = (json.loads(line) for line in log.read_text().splitlines())
     assert max(one["errors"]["with_effect"].values()) < 1.2
     assert max(one["errors"]["refitted"].values()) > 5.0
+
+
+def test_a_pump_that_hunts_has_no_name_but_a_period(tmp_path: Path) -> None:
+    plan = Plan(seed=601, duration=30.0, foreign=THIRD, only=("hunting_pump",))
+    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    assert outcome.hidden == ["hunting_pump"]
+    assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
+    (answer,) = tmp_path.glob("*/answer.json")
+    swing = json.loads(answer.read_text())["swing"]
+    assert swing["predictor"] == "valve_command"
+    assert swing["period"] == pytest.approx(1.0 / outcome.sizes["swings_at"], rel=0.02)
+    assert f"swings with a period of {swing['period']:.3g} s" in outcome.statement
+    amplitude = {command: row for command, _, row in swing["table"]}
+    assert amplitude[max(amplitude)] > 10.0 * amplitude[min(amplitude)]  # the pump lifts

@@ -14,7 +14,7 @@ from emir_analysis.diagnosis.search import Progress, Search, Tried
 from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
-from emir_analysis.diagnosis.unnamed import measured, measured_instead
+from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
@@ -71,10 +71,10 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
         refitted = final = search.whole(final)
-    with_curve = None
+    with_curve, curves = None, Curves(search.balanced, evidence, search.floor)
     if verdict == "found" and not (at_noise(final, evidence) or sticks(final)):
         progress("asking whether a curve says it better")
-        with_curve = measured_instead(final, search.balanced, evidence, search.floor)
+        with_curve = curves.measured_instead(final)
         if with_curve is not None:
             verdict = "unexplained"
     if verdict == "unexplained":
@@ -82,7 +82,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     if verdict == "unexplained" and speaking is not None and with_curve is None:
-        with_curve = _measured(chosen, search, evidence, progress)
+        with_curve = _measured(curves, chosen, search, evidence, progress)
     if with_curve is not None:
         final, after = with_curve, evidence.residuals([with_curve.machine])[0]
     return Findings(
@@ -105,15 +105,14 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
 
 
 def _measured(
-    closest: Trial, search: Search, evidence: Evidence, progress: Progress
+    curves: Curves, closest: Trial, search: Search, evidence: Evidence, progress: Progress
 ) -> Trial | None:
     """Return what no effect explains as a curve, beside the closest effects if need be."""
     progress("measuring what has no name")
-    found = measured(search.balanced, evidence, search.floor)
+    found = curves.measured()
     if found is None and closest.effects:
         progress(f"measuring what has no name beside: {closest.name}")
-        beside = fit_balances(closest, evidence, search.floor)
-        found = measured(beside, evidence, search.floor)
+        found = curves.measured(fit_balances(closest, evidence, search.floor))
     return found
 
 

@@ -5,8 +5,9 @@ there, knows the curve as finely as the machine goes over it.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -34,34 +35,53 @@ BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a c
 SMOOTHING = "smoothing_speed"
 
 
-def measured(balanced: Trial, evidence: Evidence, floor: Array) -> Trial | None:
-    """Return a trial that names no effects, and what is missing as a curve in its machine.
+class Curves:
+    """The curves that a machine may be given for what no effect explains.
 
-    balanced: without it, fitted to the balances of the whole recordings; effects that it has stay
-    in the machine. floor: (5,) of the balances. None where no curve makes most of what they lack,
-    or where with it the free run is not explained.
+    balanced: without effects, fitted to the balances of the whole recordings. floor: (5,) of the
+    balances. What they lack by the points of each curve is found once, beside `balanced`, and
+    taken to be the same beside effects.
     """
-    best = _Balances(balanced, evidence, floor).best()
-    if best is None or best.share < TOLD:
-        return None
-    found = _fitted(best.trial, evidence)
-    return found if excess(found, evidence) <= EXPLAINED**2 - 1.0 else None
 
+    def __init__(self, balanced: Trial, evidence: Evidence, floor: Array) -> None:
+        self._balanced, self._evidence, self._floor = balanced, evidence, floor
 
-def measured_instead(
-    named: Trial, balanced: Trial, evidence: Evidence, floor: Array
-) -> Trial | None:
-    """Return the same where a curve says clearly what effects only come near, each point counted.
+    @cached_property
+    def _balances(self) -> "_Balances":
+        return self._about(self._balanced)
 
-    named: with effects. balanced: without. A leak through a hole is near one in proportion to the
-    pressure in every balance, but not in the free run, which adds up what they hardly know of.
-    """
-    best = _Balances(balanced, evidence, floor).best()
-    if best is None:
-        return None
-    found = _fitted(best.trial, evidence)
-    limit = free_run_score(named, evidence, seen=0.0) - STRONG
-    return found if free_run_score(found, evidence, seen=0.0) < limit else None
+    def _about(self, known: Trial) -> "_Balances":
+        return _Balances(known, self._evidence, self._floor)
+
+    @cached_property
+    def _forms(self) -> list["_Form"]:
+        return [form for kind in KINDS for form in self._balances.forms(kind)]
+
+    def measured(self, beside: Trial | None = None) -> Trial | None:
+        """Return a trial that names no effects, and what is missing as a curve in its machine.
+
+        beside: a trial fitted to the balances, whose effects stay in the machine. None where no
+        curve makes most of what they lack, or where with it the free run is not explained.
+        """
+        balances = self._balances if beside is None else self._about(beside)
+        best = balances.best(self._forms)
+        if best is None or best.share < TOLD:
+            return None
+        found = _fitted(best.trial, self._evidence)
+        return found if excess(found, self._evidence) <= EXPLAINED**2 - 1.0 else None
+
+    def measured_instead(self, named: Trial) -> Trial | None:
+        """Return the same where a curve says clearly what effects only come near.
+
+        Each point counted. named: with effects. A leak through a hole is near one in proportion to
+        the pressure in every balance, but not in the free run, which adds up what they hardly know.
+        """
+        best = self._balances.best(self._forms)
+        if best is None:
+            return None
+        found = _fitted(best.trial, self._evidence)
+        limit = free_run_score(named, self._evidence, seen=0.0) - STRONG
+        return found if free_run_score(found, self._evidence, seen=0.0) < limit else None
 
 
 def _fitted(start: Trial, evidence: Evidence) -> Trial:
@@ -108,6 +128,18 @@ class _Begun(NamedTuple):
     share: float
 
 
+class _Form(NamedTuple):
+    """One or two curves over a signal.
+
+    named: what else a machine then has. points: of all curves. slopes: (n, c p) of what the
+    balances lack, in units of the noise, by the points of c curves.
+    """
+
+    named: dict[str, float]
+    points: tuple[Unknown, ...]
+    slopes: Array
+
+
 class _Balances:
     """What the balances lack, linear in parameters and curves about a fitted trial."""
 
@@ -127,28 +159,30 @@ class _Balances:
         fitted = (left / self._floor)[:, :, self._evidence.fitted]
         return np.asarray(fitted.reshape(len(left), -1))
 
-    def best(self) -> _Begun | None:
-        """Return the trial with a curve that the balances prefer, if there is any."""
-        begun = [start for kind in KINDS for start in self._begun(kind)]
-        return min(begun, key=lambda b: b.criterion, default=None)
+    def best(self, forms: Sequence[_Form]) -> _Begun | None:
+        """Return the trial with the curves that the balances prefer, if there is any."""
+        return min(map(self._smoothest, forms), key=lambda b: b.criterion, default=None)
 
-    def _begun(self, kind: Kind) -> list[_Begun]:
-        """Return trials with the smoothest curves that the balances allow, one for each form."""
-        forms = told_forms(kind, self._evidence)
-        if not forms:
+    def forms(self, kind: Kind) -> list[_Form]:
+        """Return the curves of a kind that the sensors allow."""
+        told = told_forms(kind, self._evidence)
+        if not told:
             return []
         first, last = ends(kind, self._evidence)
         values = {"over": kind.code, "first": first, "last": last}
         named = {f"{kind.group}.{name}": value for name, value in values.items()}
         machine = with_values(self._known.machine, named)
-        names = dict.fromkeys(name for form in forms for name in form)
-        members = {name: _points(kind, name, self._size(kind)) for name in names}
-        slopes = {name: self._of_points(machine, points) for name, points in members.items()}
-        found = []
-        for form in forms:
-            points = tuple(u for name in form for u in members[name])
-            found.append(self._smoothest(machine, points, [slopes[n] for n in form]))
-        return found
+        names = dict.fromkeys(name for form in told for name in form)
+        points = {name: _points(kind, name, self._size(kind)) for name in names}
+        slopes = {name: self._of_points(machine, points[name]) for name in names}
+        return [
+            _Form(
+                named,
+                tuple(u for name in form for u in points[name]),
+                np.hstack([slopes[name] for name in form]),
+            )
+            for form in told
+        ]
 
     def _size(self, kind: Kind) -> float:
         """Return the size of what is missing, in the unit of a kind's curves."""
@@ -170,27 +204,27 @@ class _Balances:
         moved = self._evidence.residuals([alone.at(x) for x in np.eye(len(points))])
         return np.asarray(np.nan_to_num((self._in_noise(moved) - self._missing).T))
 
-    def _smoothest(
-        self, machine: Machine, points: tuple[Unknown, ...], slopes: list[Array]
-    ) -> _Begun:
+    def _smoothest(self, form: _Form) -> _Begun:
         """Return the trial by least squares, parameters and points inside their bounds.
 
-        slopes: (n, p) of each curve. Curves' second differences are expected to be small beside
-        their size, parameters to be as stated.
+        Curves' second differences are expected to be small beside their size, parameters to be as
+        stated.
         """
-        known, curves = self._known, np.hstack(slopes)
+        known = self._known
         stated = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
-        bending = np.asarray(np.kron(np.eye(len(slopes)), BENDING), dtype=np.float64)
-        straight = np.hstack([self._slopes, curves])
+        count = len(form.points) // POINTS
+        bending = np.asarray(np.kron(np.eye(count), BENDING), dtype=np.float64)
+        straight = np.hstack([self._slopes, form.slopes])
         rows = np.vstack([straight, block_diag(stated, bending)])
         wanted = np.concatenate([-self._missing, -stated @ known.x, np.zeros(len(bending))])
-        everything = Unknowns(machine, (*known.unknowns.members, *points))
-        begin, (low, high) = np.append(known.x, np.zeros(len(points))), everything.bounds
+        machine = with_values(known.machine, form.named)
+        everything = Unknowns(machine, (*known.unknowns.members, *form.points))
+        begin, (low, high) = np.append(known.x, np.zeros(len(form.points))), everything.bounds
         room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
         x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
         left = self._missing + straight @ (x - begin)
         share = 1.0 - _above_noise(left) / _above_noise(self._missing)
-        criterion = self._criterion(left, curves, bending)
+        criterion = self._criterion(left, form.slopes, bending)
         return _Begun(_with_smoothing(everything, x), criterion, share)
 
     def _criterion(self, left: Array, curves: Array, bending: Array) -> float:

@@ -8,7 +8,7 @@ from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run
 from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.unnamed import measured, measured_instead
+from emir_analysis.diagnosis.unnamed import Curves
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
@@ -66,7 +66,7 @@ def test_nothing_is_measured_in_a_machine_that_lacks_nothing(plain: Experiment) 
     sheet = Sheet(joint1(), {"cylinder.beta": 0.1}, {}, ())
     floor = evidence.floor(sheet.machine)
     balanced = fit_balances(trial(sheet, ()), evidence, floor)
-    assert measured(balanced, evidence, floor) is None
+    assert Curves(balanced, evidence, floor).measured() is None
 
 
 def test_a_force_by_the_stroke_is_measured() -> None:
@@ -77,13 +77,33 @@ def test_a_force_by_the_stroke_is_measured() -> None:
     for tolerances in ({}, {"cylinder.beta": 0.1}):
         sheet = Sheet(joint1(), tolerances, {}, ())
         floor = evidence.floor(sheet.machine)
-        found = measured(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
+        balanced = fit_balances(trial(sheet, ()), evidence, floor)
+        found = Curves(balanced, evidence, floor).measured()
         shape = curve_of(found)
         assert (shape.name, shape.over, shape.parts.keys()) == (
             "unnamed_force", "piston_stroke", {"along"},
         )  # fmt: skip
         law = 3e4 * np.sin(20.0 * np.array(shape.signal))
         assert shape.parts["along"] == pytest.approx(law, abs=0.05 * 3e4)
+
+
+def test_a_force_by_the_stroke_is_measured_beside_an_effect() -> None:
+    """A heavy payload, without which it is not; what the curve does is found without it."""
+    values = {"over": 1, "first": AT[0], "last": AT[-1], "along": SPRING.tolist()}
+    named = {f"unnamed_force.{name}": value for name, value in values.items()}
+    machine = with_values(joint1(), named | {"effects.payload.mass": 300.0})
+    evidence = Evidence([recording(machine)], joint1())
+    sheet = Sheet(joint1(), {}, {}, ())
+    floor = evidence.floor(sheet.machine)
+    balanced, loaded = [
+        fit_balances(trial(sheet, effects), evidence, floor) for effects in ((), ("payload",))
+    ]
+    found = Curves(balanced, evidence, floor).measured(beside=loaded)
+    shape = curve_of(found)
+    assert (shape.name, shape.over) == ("unnamed_force", "piston_stroke")
+    law = 3e4 * np.sin(20.0 * np.array(shape.signal))
+    left = np.array(shape.parts["along"]) - law
+    assert np.std(left) < 0.05 * 3e4  # a constant of it the payload may have
 
 
 def test_a_curve_takes_the_place_of_an_effect_that_only_comes_near() -> None:
@@ -121,4 +141,4 @@ def instead(machine: Machine, effect: str) -> Trial | None:
     floor = evidence.floor(sheet.machine)
     balanced = fit_balances(trial(sheet, ()), evidence, floor)
     named = fit_free_run(fit_balances(trial(sheet, (effect,)), evidence, floor), evidence)
-    return measured_instead(named, balanced, evidence, floor)
+    return Curves(balanced, evidence, floor).measured_instead(named)

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.unnamed import Curves
+from emir_analysis.diagnosis.where import Where, where
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
@@ -30,8 +31,8 @@ class Findings:
     residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
     `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
     the balance that no effect takes down to the noise, the loudest or that which swings with
-    time, shape: of its residual, swing: how that swings. curve: what has no name, with which
-    `chosen` and `after` then are.
+    time, shape: of its residual, swing: how that swings, where: most of it lies. curve: what has
+    no name, with which `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -48,6 +49,7 @@ class Findings:
     speaking: str | None
     shape: Shape | None
     swing: Swing | None
+    where: Where | None
     curve: Curve | None
 
 
@@ -81,6 +83,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
+    lies = None if speaking is None else _where(evidence, after, floor, speaking)
     if verdict == "unexplained" and speaking is not None and with_curve is None:
         with_curve = _measured(curves, chosen, search, evidence, progress)
     if with_curve is not None:
@@ -100,6 +103,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         speaking=speaking,
         shape=shape,
         swing=swings,
+        where=lies,
         curve=curve(final.machine),
     )
 
@@ -160,3 +164,10 @@ def _shape(
         found.append((name, shape, swing(left[first], time[first], own, shape)))
     swinging = [each for each in found if each[2] is not None]
     return next(iter([*swinging, *found]), (None, None, None))
+
+
+def _where(evidence: Evidence, residual: Array, floor: Array, speaking: str) -> Where:
+    column = list(BALANCES).index(speaking)
+    signals = evidence.signals()
+    del signals["time"]
+    return where(residual[:, column], float(floor[column]), evidence.time, signals)

@@ -35,6 +35,7 @@ AGAINST = {
     "piston_stroke": ("piston stroke, mm", 1e3),
     "pressure_lifting": ("p_H, bar", 1e-5),
     "pressure_lowering": ("p_S, bar", 1e-5),
+    "valve_command": ("valve command", 1.0),
     "time": ("time, s", 1.0),
     "own_pressure": ("the chamber's pressure, bar", 1e-5),
     "pressure_difference": ("p_H - p_S, bar", 1e-5),

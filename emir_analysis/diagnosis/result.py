@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.statistics import (
 )
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import untold
+from emir_analysis.diagnosis.where import Where
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
@@ -122,10 +123,10 @@ class Diagnosis:
     what would do as well where ambiguous. tell_apart: a movement that would tell them apart.
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
-    stays unexplained, swing: how that swings with time. at_end: parameters that were led to the
-    end of what data sheet and registry allow. curve: what has no name and `with_effect` then has.
-    untold: what missing sensors leave open, by balance. control: a controller designed before and
-    after, on the machine as found, where that was asked for.
+    stays unexplained, swing: how that swings with time, where: most of it lies. at_end: parameters
+    that were led to the end of what data sheet and registry allow. curve: what has no name and
+    `with_effect` then has. untold: what missing sensors leave open, by balance. control: a
+    controller designed before and after, on the machine as found, where that was asked for.
     """
 
     verdict: str
@@ -142,6 +143,7 @@ class Diagnosis:
     parameters: dict[str, ParameterResult]
     shape: Shape | None
     swing: Swing | None
+    where: Where | None
     curve: Curve | None
     at_end: tuple[str, ...]
     untold: dict[str, str]
@@ -173,6 +175,7 @@ def diagnosis(
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
         swing=findings.swing,
+        where=findings.where,
         curve=findings.curve,
         at_end=at_end(findings),
         untold=untold(findings.evidence),

@@ -15,9 +15,11 @@ from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
+from emir_analysis.diagnosis.where import MOST, Where
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
+SHORT = 0.3  # of the recordings: a stretch of time that is named
 PARTS = {  # of a curve, as they are called
     "along": "whatever the direction",
     "friction": "against the motion",
@@ -42,11 +44,11 @@ def statement(findings: Findings, judged: Judged) -> str:
 
 def _of_findings(findings: Findings) -> str:
     names = " and ".join(findings.chosen.effects)
-    speaking, shape = findings.speaking, findings.shape
+    speaking, shape, lies = findings.speaking, findings.shape, findings.where
     if findings.verdict == "nothing_missing":
         return "parameters inside the tolerances bring every balance and the free run to the noise"
     remainder = ""
-    if speaking is not None and shape is not None:
+    if speaking is not None and shape is not None and lies is not None:
         column = list(BALANCES).index(speaking)
         stage = "refitted" if findings.verdict == "unexplained" else "after"
         size = level(findings.residuals[stage])[column]
@@ -56,7 +58,7 @@ def _of_findings(findings: Findings) -> str:
             f" ({noise_share:.1f} times its noise)"
         )
         if findings.curve is None:
-            remainder += f"; {_described(shape, findings.swing)}"
+            remainder += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
     if findings.verdict == "unexplained":
         rejected = " and ".join(findings.rejected)
         known = f"{rejected} comes closest but leaves too much; " if rejected else ""
@@ -137,11 +139,21 @@ def _beyond(curve: Curve, judged: Judged) -> str:
     return f", of which {100 * outside:.0f} % lie beyond what it was measured at"
 
 
-def _described(shape: Shape, swing: Swing | None) -> str:
+def _when(lies: Where, findings: Findings) -> str:
+    """Return the stretch of time that holds most of what is left, where that is short."""
+    if lies.end - lies.begin > SHORT * findings.evidence.duration(1.0):
+        return ""
+    return f" ({100 * MOST:.0f} % of it from {lies.begin:.1f} to {lies.end:.1f} s)"
+
+
+def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
     if swing is not None:
         what = f"a function of {swing.predictor}" if swing.predictor else "something"
         period, share = f"{swing.period:.3g} s", f"{100 * swing.share:.0f} %"
         return f"{what} that swings with a period of {period} predicts {share} of it"
+    if shape.share < TOLD and lies.level is not None:
+        unit = "" if lies.unit == "1" else f" {lies.unit}"
+        return f"nearly all of it lies where {lies.signal} is {lies.side} {lies.level:.3g}{unit}"
     if shape.share < TOLD:
         return "no single signal predicts it"
     direction = " and the direction of motion" if shape.by_direction else ""

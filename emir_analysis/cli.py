@@ -4,10 +4,12 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from emir_analysis.errors import InputError
+from emir_analysis.errors import IncompleteError, InputError
 from emir_common.quantity import ParameterError
 
 USAGE = """usage: emir COMMAND ...
@@ -192,6 +194,7 @@ def _view(words: list[str]) -> int:
 
 def _analyze(words: list[str]) -> int:
     from emir_analysis import run_report
+    from emir_analysis.outputs import check_outputs, write_all
 
     parser = argparse.ArgumentParser(prog="emir analyze")
     parser.add_argument("bag", type=Path, nargs="+", help="recordings of the graph")
@@ -200,17 +203,19 @@ def _analyze(words: list[str]) -> int:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the way of the robot's TCP")
     options = parser.parse_args(words)
-    runs = [run_report.analyze(bag) for bag in options.bag]
-    run_report.check_alike(runs)
-    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
-    for file, write in (
+    writes = [
         (options.json, run_report.write_json),
         (options.csv, run_report.write_csv),
         (options.html, run_report.write_report),
         (options.picture, run_report.write_path),
-    ):
-        if file:
-            write(runs, file)
+    ]
+    check_outputs([file for file, _ in writes], None, options.bag)
+    runs = [run_report.analyze(bag) for bag in options.bag]
+    run_report.check_alike(runs)
+    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
+    failed = write_all((file, partial(write, runs)) for file, write in writes)
+    if failed:
+        raise IncompleteError(runs, failed)
     return 0
 
 
@@ -384,17 +389,24 @@ def _diagnose(words: list[str]) -> int:
             raise InputError(
                 f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one"
             )
-        found = actuator.command(
+        return _said(actuator.summary, lambda: actuator.command(
             o.bag[0], o.datasheet, o.signals, judges[0], json=o.json, html=o.html,
             model_out=o.model_out, predictions=o.predictions, progress=_progress,
-        )  # fmt: skip
-        print(actuator.summary(found))
-        return 0
-    diagnosis = command(
+        ))  # fmt: skip
+    return _said(summary, lambda: command(
         o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
         model_out=o.model_out, predictions=o.predictions,
-    )  # fmt: skip
-    print(summary(diagnosis))
+    ))  # fmt: skip
+
+
+def _said(summary: Callable[[Any], str], work: Callable[[], object]) -> int:
+    """Print what some work has come to, also where not all of it could be read or written."""
+    try:
+        result = work()
+    except IncompleteError as error:
+        print(summary(error.result))
+        raise
+    print(summary(result))
     return 0
 
 

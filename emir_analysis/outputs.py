@@ -1,7 +1,8 @@
-"""Whether a command's outputs can be written, told before hours of work and not after."""
+"""A command's outputs: what cannot be written is told before hours of work, and loses nothing."""
 
 import os
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from emir_analysis.errors import InputError
@@ -12,10 +13,12 @@ def check_outputs(
 ) -> None:
     """Raise InputError for an output that cannot be written or would overwrite something.
 
-    files: to write, replaced where they exist; none of them may be another one or an input.
-    folder: to write into, which has to be new or empty. None: not asked for.
+    files: to write, replaced where they exist; none of them may be another one, an input, or lie
+    in a folder that is one. folder: to write into, which has to be new or empty. None: not asked
+    for.
     """
-    taken = {path.resolve() for path in inputs if path is not None}
+    given = {path.resolve() for path in inputs if path is not None}
+    taken = set(given)
     for file in files:
         if file is None:
             continue
@@ -23,18 +26,59 @@ def check_outputs(
             raise InputError(f"{file}: no such folder {file.parent}")
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: not a file that can be written")
-        if not os.access(file if file.exists() else file.parent, os.W_OK):
-            raise InputError(f"{file}: may not be written")
+        _check_apart(file, given)
         if file.resolve() in taken:
             raise InputError(f"{file}: an input or another output is of that name")
+        _check_writable(file)
         taken.add(file.resolve())
     if folder is not None:
-        _check_folder(folder)
+        _check_apart(folder, given)
+        _check_folder(folder, taken)
 
 
-def _check_folder(folder: Path) -> None:
+def write_all(
+    writes: Iterable[tuple[Path | None, Callable[[Path], None]]],
+) -> list[InputError]:
+    """Write every output that is asked for, whatever becomes of one; return what could not be."""
+    failed = []
+    for path, write in writes:
+        try:
+            if path is not None:
+                write(path)
+        except InputError as error:
+            failed.append(error)
+    return failed
+
+
+def _check_apart(output: Path, inputs: set[Path]) -> None:
+    """Raise InputError for an output in a folder that is read."""
+    read = inputs.intersection(output.resolve().parents)
+    if read:
+        raise InputError(f"{output}: lies in {min(read)}, which is read")
+
+
+def _check_folder(folder: Path, taken: set[Path]) -> None:
+    if folder.resolve() in taken:
+        raise InputError(f"{folder}: an input or another output is of that name")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already, and is not overwritten")
     there = next(parent for parent in (folder, *folder.resolve().parents) if parent.exists())
-    if not os.access(there, os.W_OK):
-        raise InputError(f"{folder}: may not be written")
+    if not there.is_dir():
+        raise InputError(f"{folder}: {there} is not a folder")
+    _check_room(there, folder)
+
+
+def _check_writable(file: Path) -> None:
+    if not file.exists():
+        _check_room(file.parent, file)
+    elif not os.access(file, os.W_OK):
+        raise InputError(f"{file}: may not be written")
+
+
+def _check_room(there: Path, output: Path) -> None:
+    """Raise InputError where a folder takes no file: who may write may not be able to."""
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise InputError(f"{output}: may not be written: {error.strerror}") from None

@@ -14,10 +14,9 @@ from emir_analysis.diagnosis.page import write_page
 from emir_analysis.diagnosis.predictions import write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
 from emir_analysis.diagnosis.search import Progress
-from emir_analysis.diagnosis.summary import summary
 from emir_analysis.diagnosis.wiring import check_wiring
-from emir_analysis.errors import InputError
-from emir_analysis.outputs import check_outputs
+from emir_analysis.errors import IncompleteError, InputError
+from emir_analysis.outputs import check_outputs, write_all
 from emir_analysis.signals import SignalMap, read_signal_map
 from emir_plant.parameters import Machine
 from emir_plant.sheet import data, load_sheet
@@ -44,7 +43,8 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     opened when everything is fitted; `bag` itself when not given. json, html: files to write.
     model_out: file for the machine as found; a controller designed before and after is then
     compared on it. predictions: folder for the simulated runs. Raises InputError or
-    ParameterError, one line each, for anything that cannot be used.
+    ParameterError, one line each, for anything that cannot be used; IncompleteError, with the
+    result, where a judge recording or an output cannot.
     """
     judges = _several(judge)
     inputs = [datasheet, signals, *_several(bag), *judges]
@@ -57,29 +57,39 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     experiments = [_opened(each, signal_map, sheet.machine, progress) for each in _several(bag)]
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
-    try:
-        opened = [_opened(path, signal_map, sheet.machine, progress) for path in judges]
-        useless = None
-    except InputError as error:  # what was found is written all the same
-        opened, useless = [], error
+    opened, failed = _judges(judges, signal_map, sheet.machine, progress)
     judgement = judged(findings, opened or experiments)
     control = None
     if model_out is not None:
         progress("designing a controller before and after")
         control = before_and_after(findings.sheet.machine, findings.chosen.machine)
     result = diagnosis(findings, judgement, control)
-    if json is not None:
-        write_json(json, result)
-    if model_out is not None:
-        write_model(model_out, findings.chosen.machine, result.recording)
-    if predictions is not None:
-        write_predictions(predictions, judgement)
-    if html is not None:
-        write_page(html, findings, result, judgement)
-    if useless is not None:
-        progress(summary(result))
-        raise InputError(f"{useless}; what was found is judged on the same recordings")
+    failed += write_all(
+        [
+            (json, lambda file: write_json(file, result)),
+            (model_out, lambda file: write_model(file, findings.chosen.machine, result.recording)),
+            (predictions, lambda folder: write_predictions(folder, judgement)),
+            (html, lambda file: write_page(file, findings, result, judgement)),
+        ]
+    )
+    if failed:
+        raise IncompleteError(result, failed)
     return result
+
+
+def _judges(
+    paths: Sequence[Path], signal_map: SignalMap | None, machine: Machine, progress: Progress
+) -> tuple[list[Experiment], list[InputError]]:
+    """Return the judge recordings that can be used, and why others cannot."""
+    opened: list[Experiment] = []
+    useless: list[InputError] = []
+    for path in paths:
+        try:
+            opened.append(_opened(path, signal_map, machine, progress))
+        except InputError as error:
+            useless.append(error)
+    on = "the others" if opened else "the same recordings"
+    return opened, [InputError(f"{error}; what was found is judged on {on}") for error in useless]
 
 
 def _opened(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from emir_analysis.errors import InputError
-from emir_analysis.outputs import check_outputs
+from emir_analysis.outputs import check_outputs, write_all
 
 
 def test_what_can_be_written_passes(tmp_path: Path) -> None:
@@ -23,12 +23,34 @@ def test_what_can_be_written_passes(tmp_path: Path) -> None:
         (lambda t: ([t / "a.json", t / "a.json"], None), "another output"),
         (lambda t: ([t / "." / "sheet.yaml"], None), "an input"),
         (lambda t: ([], t), "exists already"),
+        (lambda t: ([t / "bag" / "bag_0.mcap"], None), "which is read"),
+        (lambda t: ([t / "bag" / "new.json"], None), "which is read"),
+        (lambda t: ([], t / "bag" / "runs"), "which is read"),
+        (lambda t: ([], t / "sheet.yaml" / "runs"), "which is read"),
+        (lambda t: ([], t / "other.yaml" / "runs"), "is not a folder"),
+        (lambda t: ([t / "runs"], t / "runs"), "another output"),
+        (lambda _: ([Path("/sys/a.json")], None), "may not be written"),
+        (lambda _: ([], Path("/sys/runs")), "may not be written"),
     ],
 )
 def test_what_cannot_be_written_is_told(
     asked: Callable[[Path], tuple[list[Path], Path | None]], said: str, tmp_path: Path
 ) -> None:
     (tmp_path / "sheet.yaml").touch()
+    (tmp_path / "other.yaml").touch()
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "bag_0.mcap").touch()
     files, folder = asked(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
     with pytest.raises(InputError, match=said):
-        check_outputs(files, folder, [tmp_path / "sheet.yaml"])
+        check_outputs(files, folder, [tmp_path / "sheet.yaml", tmp_path / "bag"])
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_one_output_that_fails_costs_no_other(tmp_path: Path) -> None:
+    def full(file: Path) -> None:
+        raise InputError(f"{file}: No space left on device")
+
+    failed = write_all([(tmp_path / "a", full), (None, full), (tmp_path / "b", Path.touch)])
+    assert [str(error) for error in failed] == [f"{tmp_path / 'a'}: No space left on device"]
+    assert (tmp_path / "b").exists()

@@ -14,9 +14,9 @@ from emir_analysis.diagnosis.actuator.result import (
 )
 from emir_analysis.diagnosis.actuator.search import Progress, search
 from emir_analysis.diagnosis.result import write_json
-from emir_analysis.errors import InputError
+from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.import_command import write_signals
-from emir_analysis.outputs import check_outputs
+from emir_analysis.outputs import check_outputs, write_all
 from emir_analysis.signals import Array, Source, read_signal_map
 from emir_plant.actuator import load_actuator, write_actuator
 
@@ -38,7 +38,8 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     judge: recording on which the errors are stated, opened when everything is fitted and
     chosen; `bag` itself when not given. model_out: data sheet with the effects to write.
     predictions: folder for the simulated runs beside the measured. Raises InputError or
-    ParameterError, one line each, for anything that cannot be used.
+    ParameterError, one line each, for anything that cannot be used; IncompleteError, with the
+    result, where an output cannot be written.
     """
     check_outputs([json, html, model_out], predictions, [datasheet, signals, bag, judge])
     sheet = load_actuator(datasheet)
@@ -51,8 +52,9 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     record = open_record(bag, signal_map)
     found = search(sheet, record, noise_floor(sheet, record), progress)
     machines = stages(sheet, found)
-    if model_out is not None:  # frozen before the judge is opened
-        write_actuator(model_out, replace(sheet, machine=found.chosen.machine))
+    # frozen before the judge is opened
+    as_found = replace(sheet, machine=found.chosen.machine)
+    failed = write_all([(model_out, lambda file: write_actuator(file, as_found))])
     judged = None
     if judge is not None:
         progress(f"judging on {judge}")
@@ -60,12 +62,15 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     runs = judged_runs(machines, record, judged)
     shown = record if judged is None else judged
     result = diagnosis(sheet, found, record, judged, runs)
-    if json is not None:
-        write_json(json, result)
-    if html is not None:
-        write_page(html, result, shown, runs)
-    if predictions is not None:
-        _write_runs(predictions, shown, runs)
+    failed += write_all(
+        [
+            (json, lambda file: write_json(file, result)),
+            (html, lambda file: write_page(file, result, shown, runs)),
+            (predictions, lambda folder: _write_runs(folder, shown, runs)),
+        ]
+    )
+    if failed:
+        raise IncompleteError(result, failed)
     return result
 
 

@@ -11,16 +11,18 @@ from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 
 SEPARATORS = ",;\t"
+COMMENT = "#"
 
 
 def read_columns(file: Path, wanted: Iterable[str]) -> dict[str, Array]:
     """Return the wanted columns by name, (n,) each.
 
-    The first line names the columns; comma, semicolon or tab stand between. Columns that nobody
+    The first line names the columns, behind comments (#); comma, semicolon or tab stand between.
+    Where it is not a comma, a decimal comma is read, too. Columns that nobody
     wants may hold anything. Raises InputError, naming file, line and column, for a file that
     cannot be read, a missing header or column, rows of different length, text, blanks and NaN.
     """
-    rows = _rows(file)
+    rows, point = _rows(file)
     if not rows:
         raise InputError(f"{file}: empty")
     header = [name.strip() for name in rows[0][1]]
@@ -35,32 +37,37 @@ def read_columns(file: Path, wanted: Iterable[str]) -> dict[str, Array]:
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise InputError(f"{file}: line {line}: {len(row)} cells under {len(header)} columns")
-    return {name: _column(file, rows[1:], name, header.index(name)) for name in wanted}
+    return {name: _column(file, rows[1:], name, header.index(name), point) for name in wanted}
 
 
-def _rows(file: Path) -> list[tuple[int, list[str]]]:
-    """Return each row that is not blank with the number of its line."""
+def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
+    """Return each row that is not blank with the number of its line, and what may be its point."""
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            first = stream.readline()
+            first = next((line for line in stream if not line.startswith(COMMENT)), "")
             stream.seek(0)
             separator = max(SEPARATORS, key=first.count)
             reader = csv.reader(stream, delimiter=separator)
-            return [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file}: not a CSV file: {error}") from None
+    header = next((k for k, (_, row) in enumerate(rows) if not row[0].startswith(COMMENT)), 0)
+    return rows[header:], "." if separator == "," else ","
 
 
-def _column(file: Path, rows: list[tuple[int, list[str]]], name: str, index: int) -> Array:
+def _column(
+    file: Path, rows: list[tuple[int, list[str]]], name: str, index: int, point: str
+) -> Array:
     values = np.empty(len(rows))
     for k, (line, row) in enumerate(rows):
         text = row[index].strip()
-        if not _is_number(text):
+        number = text.replace(point, ".")
+        if not _is_number(number):
             shown = repr(text) if text else "empty"
             raise InputError(f"{file}: line {line}: {name} is {shown}, not a number")
-        values[k] = float(text)
+        values[k] = float(number)
         if not math.isfinite(values[k]):
             raise InputError(f"{file}: line {line}: {name} is {text}")
     return values

@@ -182,7 +182,9 @@ def _time(table: Path, clock: _Clock, read: dict[str, Array], count: int) -> Arr
     if behind.size:
         raise InputError(f"{table}: {clock.column} does not increase at row {behind[0] + 1}")
     if time[0] < 0.0 or time[-1] >= LAST_STAMP:
-        raise InputError(f"{table}: {clock.column}: a stamp holds 0 ... {LAST_STAMP} s")
+        raise InputError(
+            f"{table}: {clock.column}: a stamp holds 0 ... {LAST_STAMP} s; let the times begin at 0"
+        )
     return np.asarray(time)
 
 

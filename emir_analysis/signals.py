@@ -104,6 +104,8 @@ def _times(where: str, stamps: columns.Times, start: int) -> Array:
     """Return the stamps as times from the start, ns, in s."""
     if stamps.size < FEWEST_SAMPLES:
         raise InputError(f"{where}: {stamps.size} message, too few for a signal")
+    if not np.any(stamps):
+        raise InputError(f"{where}: the headers' stamps are not set, all are 0; record with stamps")
     time = np.asarray((stamps - start) * 1e-9)
     behind = np.flatnonzero(np.diff(time) <= 0.0)
     if behind.size:

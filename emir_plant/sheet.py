@@ -10,6 +10,7 @@ only what differs from another one beside it: `based_on: joint1.yaml`.
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -21,6 +22,8 @@ from emir_plant.parameters import Machine
 
 BASED_ON = "based_on"
 MORE_TOLD = "sensors."  # where a data sheet may tell more, such as the recording's rate
+ENTRY = ("value", "unit", "tol", "source")  # what an entry says
+ALIKE, SAME = 0.7, 0.9  # of two names, in which they are probably the same (difflib)
 EFFECTS = "effects."  # in front of an effect's name in a dotted path
 
 
@@ -28,7 +31,8 @@ EFFECTS = "effects."  # in front of an effect's name in a dotted path
 class Sheet:
     """A machine as stated: parameters, relative tolerances and sources by dotted path.
 
-    ignored: entries that are no parameter of the machine, such as the recording's rate.
+    ignored: entries that are no parameter of the machine, such as the recording's rate, and what
+    else entries say.
     """
 
     machine: Machine
@@ -103,7 +107,15 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         for name, about in quantities(kind).items()
     }
     headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
-    unknown = tuple(path for path in entries if path not in known)
+    unknown = [path for path in entries if path not in known]
+    unread = [
+        f"{path}.{key}" for path in entries if path in known for key in entries[path]
+        if key not in ENTRY
+    ]  # fmt: skip
+    for path in unknown:
+        near = get_close_matches(path, known, n=1, cutoff=SAME)
+        if path.startswith(MORE_TOLD) and near and near[0] not in entries:
+            raise ParameterError(f"{path}: there is no such parameter; is {near[0]} meant?")
     wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
     for path in [*wrong, *(headings if strict else [])]:
         raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
@@ -114,9 +126,7 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
             continue
         if entry.get("unit", about.unit) != about.unit:
             raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
-        misspelt = [key for key in entry if str(key).startswith("tol") and key != "tol"]
-        if misspelt:
-            raise ParameterError(f"{path}: {misspelt[0]}: a tolerance is given as tol")
+        _check_entry(path, entry)
         values[path] = _value(entry.get("value", 1.0), path, about)
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
     effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
@@ -125,8 +135,17 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         machine=Machine(**groups, effects=effects),
         tolerances={path: _tolerance(e, path) for path, e in stated.items() if "tol" in e},
         sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
-        ignored=unknown,
+        ignored=(*unknown, *unread),
     )
+
+
+def _check_entry(path: str, entry: Iterable[Any]) -> None:
+    """Raise ParameterError for a key of an entry that is nearly one which is read."""
+    for key in map(str, entry):
+        near = get_close_matches(key.lower(), ENTRY, n=1, cutoff=ALIKE)
+        meant = ["tol"] if key.lower().startswith("tol") else near
+        if key not in ENTRY and meant:
+            raise ParameterError(f"{path}: {key}: is {meant[0]} meant?")
 
 
 def _there_are(path: str, known: Iterable[str]) -> str:

@@ -6,7 +6,12 @@ from pathlib import Path
 from emir_analysis.bags import files, is_finished
 from emir_analysis.diagnosis.control import before_and_after
 from emir_analysis.diagnosis.diagnose import diagnose
-from emir_analysis.diagnosis.experiment import Experiment, open_experiment
+from emir_analysis.diagnosis.experiment import (
+    SIGNALS,
+    Experiment,
+    check_signal_map,
+    open_experiment,
+)
 from emir_analysis.diagnosis.graph_signals import graph_signals
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.model_file import write_model
@@ -53,7 +58,13 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     missing = [path for path in judges if not path.exists()]
     if missing:
         raise InputError(f"{missing[0]}: no such recording")
-    signal_map = None if signals is None else read_signal_map(signals)
+    signal_map = None if signals is None else _checked_map(signals)
+    for file, unread in (
+        (datasheet, sheet.ignored),
+        (signals, [name for name in signal_map or () if name not in SIGNALS]),
+    ):
+        if unread:
+            progress(f"{file}: not used: {', '.join(unread)}")
     experiments = [_opened(each, signal_map, sheet.machine, progress) for each in _several(bag)]
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
@@ -75,6 +86,15 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     if failed:
         raise IncompleteError(result, failed)
     return result
+
+
+def _checked_map(signals: Path) -> SignalMap:
+    signal_map = read_signal_map(signals)
+    try:
+        check_signal_map(signal_map)
+    except InputError as error:
+        raise InputError(f"{signals}: {error}") from None
+    return signal_map
 
 
 def _judges(

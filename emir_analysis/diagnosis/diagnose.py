@@ -104,7 +104,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         shape=shape,
         swing=swings,
         where=lies,
-        curve=curve(final.machine),
+        curve=None if with_curve is None else curve(final.machine),
     )
 
 

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.recording_checks import (
     check_motion,
     check_readings,
     check_sampling,
+    check_shared,
     check_values,
     stamps,
 )
@@ -145,28 +146,31 @@ class Experiment:
 def open_experiment(path: Path, signal_map: SignalMap, machine: Machine) -> Experiment:
     """Load a recording for the diagnosis.
 
-    A sensor that the signal map leaves out is done without. Raises InputError for a missing
-    command, a missing angle and stroke, another unit, gaps, a recording that is too short, does
-    not start at rest or never moves; the message says what to record instead.
+    A sensor that the signal map leaves out is done without. Raises InputError as
+    `check_signal_map`, and for gaps, a recording that is too short, does not start at rest or
+    never moves; the message says what to record instead.
+    """
+    check_signal_map(signal_map)
+    mapped = {name: signal_map[name] for name in SIGNALS if name in signal_map}
+    return experiment(str(path), load(path, mapped), machine)
+
+
+def check_signal_map(signal_map: SignalMap) -> None:
+    """Raise InputError for a missing command, a missing angle and stroke, another unit.
+
+    And for a name that is nearly that of a signal which the map has not.
     """
     if COMMAND not in signal_map:
         raise InputError(f"the signal map has no {COMMAND}, without which nothing can be told")
     if not {ANGLE, STROKE} & set(signal_map):
         raise InputError(f"the signal map has neither {ANGLE} nor {STROKE}; one is needed")
-    _check_names(signal_map)
-    mapped = {name: signal_map[name] for name in SIGNALS if name in signal_map}
-    for name, source in mapped.items():
-        if source[2] != SIGNALS[name]:
-            raise InputError(f"the signal map has {name} in {source[2]}, expected {SIGNALS[name]}")
-    return experiment(str(path), load(path, mapped), machine)
-
-
-def _check_names(signal_map: SignalMap) -> None:
-    """Raise InputError for a name that is nearly that of a signal which the map has not."""
     for name in signal_map:
         near = get_close_matches(name, SIGNALS, n=1, cutoff=ALIKE)
         if name not in SIGNALS and near and near[0] not in signal_map:
             raise InputError(f"the signal map has {name}; is {near[0]} meant?")
+    for name, unit in SIGNALS.items():
+        if name in signal_map and signal_map[name][2] != unit:
+            raise InputError(f"the signal map has {name} in {signal_map[name][2]}, expected {unit}")
 
 
 def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
@@ -174,6 +178,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
     for signal in sensors.values():
         check_sampling(name, signal)
+    check_shared(name, list(sensors.values()))
     begin = max(signal.time[0] for signal in sensors.values())
     end = min(signal.time[-1] for signal in sensors.values())
     if end - begin < SHORTEST:
@@ -194,7 +199,9 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)
     if STROKE not in shown:
         shown[STROKE] = _strokes(angle, machine)
-    check_motion(name, angle, machine)
+    # one of the two may be that of a sensor that stands still
+    moved = max((angle, _angles(shown[STROKE], machine)), key=np.ptp)
+    check_motion(name, moved, machine)
     for signal in sensors.values():
         check_readings(name, signal, time, angle, machine)
     check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)

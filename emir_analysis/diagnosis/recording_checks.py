@@ -1,6 +1,7 @@
 """What makes a recording useless for a diagnosis, each said in one line with the remedy."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from emir_analysis.signals import Array, Signal
 from emir_plant.parameters import Machine
 
 LARGEST_GAP = 0.2  # s without a sample: the slow mode is still followed by interpolation
+ROUNDING = 1e-6  # s, of stamps
 LONGEST_HELD = 0.5  # s without a command that is published regularly, valve open ...
 MUCH_LONGER = 10.0  # ... and times the usual gap, that of ...
 USUAL = 0.95  # of all
@@ -33,7 +35,6 @@ LARGEST = {  # beyond which a signal is not in its unit, and the unit that it is
     "pressure_lifting": (1e9, "mPa"),
     "pressure_lowering": (1e9, "mPa"),
     "joint_angle": (2.0 * math.pi, "deg"),
-    "piston_stroke": (20.0, "mm"),
     "tip_deflection_angle": (1.0, "mrad or deg"),
 }
 
@@ -49,11 +50,25 @@ def check_sampling(name: str, signal: Signal) -> None:
     """Raise InputError where a signal has a gap."""
     gaps = np.diff(signal.time)
     widest = int(np.argmax(gaps))
-    if gaps[widest] > LARGEST_GAP:
+    if gaps[widest] > LARGEST_GAP + ROUNDING:
         raise InputError(
             f"{name}: {signal.name} has a gap of {gaps[widest]:.2f} s"
             f" at {signal.time[widest]:.2f} s; record without gaps"
         )
+
+
+def check_shared(name: str, sensors: Sequence[Signal]) -> None:
+    """Raise InputError where one sensor has ended before another begins."""
+    first = min(sensors, key=lambda signal: float(signal.time[-1]))
+    last = max(sensors, key=lambda signal: float(signal.time[0]))
+    if first.time[-1] < last.time[0]:
+        raise InputError(
+            f"{name}: {_from_to(first)} and {_from_to(last)} share no time; stamp all by one clock"
+        )
+
+
+def _from_to(signal: Signal) -> str:
+    return f"{signal.name}, {signal.time[0]:.1f} ... {signal.time[-1]:.1f} s,"
 
 
 def check_command(name: str, command: Signal, begin: float, end: float, machine: Machine) -> None:
@@ -214,6 +229,9 @@ def stamps(signal: Signal) -> Stamps:
 
 def check_values(name: str, shown: dict[str, Array], machine: Machine) -> None:
     """Raise InputError for a sensor that stands still or speaks another unit than it says."""
+    geometry = machine.geometry
+    longest = geometry.triangle_a + geometry.triangle_b  # the cylinder's triangle, stretched
+    largest = LARGEST | {"piston_stroke": (longest, "mm or cm")}
     for signal, value in shown.items():
         if np.ptp(value) == 0.0:
             raise InputError(
@@ -221,10 +239,10 @@ def check_values(name: str, shown: dict[str, Array], machine: Machine) -> None:
                 " sensor and record again, or leave it out of the signal map"
             )
         size = float(np.max(np.abs(value)))
-        if signal in LARGEST and size > LARGEST[signal][0]:
+        if signal in largest and size > largest[signal][0]:
             raise InputError(
                 f"{name}: {signal} reaches {size:.4g}, more than a machine can; is it in"
-                f" {LARGEST[signal][1]}? It has to be recorded in the signal map's unit"
+                f" {largest[signal][1]}? It has to be recorded in the signal map's unit"
             )
         if signal.startswith("pressure") and size < LEAST_PRESSURE * machine.supply.p0:
             raise InputError(

@@ -13,7 +13,7 @@ from emir_analysis.signals import Array
 
 # what only this balance shows: effects that can otherwise not be named, or not be told apart
 ONLY_HERE = {
-    "force": "friction, payload, external load and linkage cannot be told from each other",
+    "force": "friction, payload, external load and linkage are told apart by the motion alone",
     "lifting_chamber": "valve, leakage and air of the lifting side show in the motion alone",
     "lowering_chamber": "valve, leakage and air of the lowering side show in the motion alone",
     "linkage": "a stroke that does not fit the angle goes unseen",

@@ -1,9 +1,10 @@
-"""Signals that are not what the signal map calls them: two exchanged, or a sign turned round.
+"""Signals that are not what the signal map calls them: exchanged, turned round, in another unit.
 
 The machine as the data sheet has it tells: with the right wiring far less is missing in the
 balances, whatever else the machine lacks.
 """
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ LESS = 3.0  # times, geometric mean; the right wiring leaves a tenth and less of
 class Wiring(NamedTuple):
     """Another wiring, the balances that it changes, and what is to be done."""
 
-    columns: dict[str, tuple[str, float]]  # output: what it truly is, times a sign
+    columns: dict[str, tuple[str, float]]  # output: what it truly is, times a factor
     balances: tuple[str, ...]
     told: str
 
@@ -37,6 +38,14 @@ WIRINGS = (
         {DEFLECTION: (DEFLECTION, -1.0)},
         ("bending",),
         f"{DEFLECTION} has its sign turned round; it is negative where the boom sags",
+    ),
+    *(
+        Wiring(
+            {DEFLECTION: (DEFLECTION, factor)},
+            ("bending",),
+            f"{DEFLECTION} looks to be in {unit}; it has to be recorded in rad",
+        )
+        for unit, factor in (("deg", math.radians(1.0)), ("mrad", 1e-3))
     ),
     Wiring(
         {STROKE: (STROKE, -1.0)},
@@ -69,8 +78,8 @@ def _told(wiring: Wiring, experiment: Experiment) -> bool:
 
 def _rewired(experiment: Experiment, wiring: Wiring) -> Experiment:
     outputs, order = experiment.outputs.copy(), list(OUTPUTS)
-    for name, (true, sign) in wiring.columns.items():
-        outputs[:, order.index(name)] = sign * experiment.outputs[:, order.index(true)]
+    for name, (true, factor) in wiring.columns.items():
+        outputs[:, order.index(name)] = factor * experiment.outputs[:, order.index(true)]
     return replace(experiment, outputs=outputs)
 
 

@@ -241,6 +241,11 @@ def test_values_are_set_by_path(built: Machine) -> None:
 
 
 def _still(topics: Topics) -> None:
+    _dead_resolver(topics)
+    topics["cylinder"] = topics["joint_states"]
+
+
+def _dead_resolver(topics: Topics) -> None:
     time, value = topics["joint_states"]
     topics["joint_states"] = (time, np.full_like(value, value[0]))
 
@@ -269,6 +274,11 @@ def _lost_commands(topics: Topics) -> None:
 def _another_clock(topics: Topics) -> None:
     time, value = topics["valve_command"]
     topics["valve_command"] = (time + 3600.0, value)
+
+
+def _clocks_of_their_own(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    topics["pressure_lifting"] = (time + 3600.0, value)
 
 
 def _too_much(topics: Topics) -> None:
@@ -319,6 +329,11 @@ def _in_degrees(topics: Topics) -> None:
     topics["joint_states"] = (time, np.degrees(value))
 
 
+def _in_centimetres(topics: Topics) -> None:
+    time, value = topics["cylinder"]
+    topics["cylinder"] = (time, 10.0 * value)
+
+
 def _dead_sensor(topics: Topics) -> None:
     time, value = topics["pressure_lowering"]
     topics["pressure_lowering"] = (time, np.full_like(value, 2e5))
@@ -339,11 +354,13 @@ def _twice_the_same_time(topics: Topics) -> None:
     ("spoil", "reason"),
     [
         (_still, "never moves"),
+        (_dead_resolver, "joint_angle is constant"),
         (_closed, "never leaves the dead zone"),
         (_moving, "a second at rest"),
         (_late_command, "moves before the first valve_command at 3.00 s"),
         (_lost_commands, "valve_command has a gap of 2.0. s at 3.99 s"),
         (_another_clock, "shares no time with the sensors"),
+        (_clocks_of_their_own, "pressure_lifting, 3600.0 .* share no time; stamp all by one clock"),
         (_too_much, "valve_command reaches 1.32"),
         (_frozen, "pressure_lifting stays at .* for 3.0 s from 4.0"),
         (_out_of_range, "pressure_lifting goes no further than 8.3e.06 while the boom moves"),
@@ -353,6 +370,7 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_short, "record at least 10 s"),
         (_in_bar, "is it in bar"),
         (_in_degrees, "is it in deg"),
+        (_in_centimetres, "piston_stroke reaches .* more than a machine can; is it in mm or cm"),
         (_dead_sensor, "pressure_lowering is constant"),
         (_not_recorded, "topic /rig/boom_deflection is not recorded"),
         (_twice_the_same_time, "/rig/cylinder: stamps out of order at 7.0"),

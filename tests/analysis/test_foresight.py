@@ -2,7 +2,8 @@
 
 import numpy as np
 import recorded
-from test_diagnosis_search import TOLERANCES, operated
+from operated import operated
+from test_diagnosis_search import TOLERANCES
 
 from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence

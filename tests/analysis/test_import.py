@@ -62,6 +62,20 @@ def test_the_same_map_reads_the_recording(tmp_path: Path, signals: Path) -> None
     np.testing.assert_allclose(recording["pressure"].value, [1.5e5, 2.5e5, 3e5])
 
 
+GERMAN = TABLE.replace(",", ";").replace(".", ",")
+
+
+@pytest.mark.parametrize("text", [GERMAN, f"# rig 3, 2026, bar\n#\n{TABLE}", f"# bar\n{GERMAN}"])
+def test_a_table_with_comments_or_decimal_commas_is_the_same(
+    tmp_path: Path, signals: Path, text: str
+) -> None:
+    import_csv(_table(tmp_path, text), signals, tmp_path / "bag")
+    import_csv(_table(tmp_path), signals, tmp_path / "plain")
+    both = [load(tmp_path / name, read_signal_map(signals)) for name in ("bag", "plain")]
+    for name in ("pressure", "stroke", "speed"):
+        assert both[0][name].value.tolist() == both[1][name].value.tolist()
+
+
 @pytest.mark.parametrize("kind", DEFINITIONS)
 def test_definitions_and_hashes_are_those_of_ros(kind: str) -> None:
     store = get_typestore(Stores.ROS2_JAZZY)

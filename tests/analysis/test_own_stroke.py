@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import recorded
-from test_diagnosis_search import TOLERANCES, run
+from operated import moved
+from test_diagnosis_search import TOLERANCES
 
 from emir_analysis.diagnosis.balances import LINKAGE, Balances, level, sensed
 from emir_analysis.diagnosis.evidence import Evidence
@@ -93,7 +94,7 @@ def test_a_linkage_and_a_play_that_are_known_leave_the_balance_quiet(
 )
 def test_what_shows_between_stroke_and_angle_is_named(hidden: dict[str, float], name: str) -> None:
     machine = with_values(MEASURED, hidden)
-    own = run(machine)
+    own = moved(machine)
     ideal = free_runs([machine], own, [(0.8, 20e5)])[0]
     evidence = Evidence([sensed(own, machine, ideal)], MEASURED)
     found = Search(evidence, Sheet(MEASURED, TOLERANCES, {}, ()), lambda _: None).run()

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 import recorded
-from test_diagnosis_search import TOLERANCES, operated, search
+from operated import operated
+from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import stick_slip
 from emir_analysis.diagnosis.candidates import Trial, fit_balances, free_run_errors, trial

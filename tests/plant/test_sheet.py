@@ -49,7 +49,9 @@ def test_every_number_of_the_machine_has_a_source() -> None:
         ("beta: {value: 5.0e+8", "beta: {tol: , value: 5.0e+8", "tol = None: not a number"),
         ("beta: {value: 5.0e+8", "beta: {tol: 15, value: 5.0e+8", "tol = 15: a relative one"),
         ("beta: {value: 5.0e+8", "beta: {tol: .nan, value: 5.0e+8", "tol = nan: a relative one"),
-        ("beta: {value: 5.0e+8", "beta: {tolerance: 1, value: 5.0e+8", "is given as tol"),
+        ("beta: {value: 5.0e+8", "beta: {tolerance: 1, value: 5.0e+8", "is tol meant?"),
+        ("beta: {value: 5.0e+8", "beta: {Tol: 0.1, value: 5.0e+8", "Tol: is tol meant?"),
+        ("beta: {value: 5.0e+8, unit", "beta: {value: 5.0e+8, unti", "unti: is unit meant?"),
         ("sections_per_arm: {value: 4", "sections_per_arm: {value: 4.5", "not a whole number"),
     ],
 )

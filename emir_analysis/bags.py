@@ -71,8 +71,7 @@ def read(path: Path, topics: Collection[str] | None = None) -> dict[str, list[Me
         raise InputError(f"{path}: no message in it")
     for topic in topics or ():
         if topic not in found:
-            there = ", ".join(sorted(recorded_topics(path))) or "none (cut off before the first?)"
-            raise InputError(f"{path}: topic {topic} is not recorded; there are: {there}")
+            raise not_recorded(path, topic)
     for messages in found.values():
         messages.sort(key=lambda message: message.log_time)
     return found
@@ -112,6 +111,15 @@ def _place(file: Path) -> tuple[int, str]:
 def recorded_topics(path: Path) -> set[str]:
     """Return the names of the topics in a recording. Raises InputError as `read`."""
     return {record.topic for record in _beside_messages(path) if isinstance(record, Channel)}
+
+
+def not_recorded(path: Path, topic: str) -> InputError:
+    """Return the error that a recording has no message of a topic."""
+    there = recorded_topics(path)
+    if topic in there:
+        return InputError(f"{path}: no message of topic {topic} in it")
+    shown = ", ".join(sorted(there)) or "none (cut off before the first?)"
+    return InputError(f"{path}: topic {topic} is not recorded; there are: {shown}")
 
 
 def records(file: Path) -> Iterator[McapRecord | Raw]:

@@ -82,7 +82,7 @@ def _complain(who: str, message: str) -> int:
 
 def _run(words: list[str]) -> int:
     """Run the graph."""
-    return _hand_over("emir_ros.run", words)
+    return _hand_over("emir_ros.start", ["run", *words])
 
 
 def _hand_over(module: str, words: list[str]) -> int:

@@ -41,8 +41,7 @@ def read(path: Path, wanted: Mapping[str, Collection[str]]) -> dict[str, Columns
         _read(file, topics)
     for name, topic in topics.items():
         if not topic.log_times:
-            there = ", ".join(sorted(bags.recorded_topics(path))) or "none"
-            raise InputError(f"{path}: topic {name} is not recorded; there are: {there}")
+            raise bags.not_recorded(path, name)
     return {name: topic.columns(path) for name, topic in topics.items()}
 
 

@@ -6,6 +6,7 @@ state follows it, and what it offers is then the command with which it would tak
 jump.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
@@ -112,7 +113,8 @@ class Selector:
                 known = ", ".join(self.controllers)
                 raise ParameterError(f"controller {switch.name!r}: running are {known}")
         times = [switch.time for switch in self.switches]
-        if times != sorted(set(times)) or times[:1] != [0.0]:
+        rising = times == sorted(set(times)) and times[:1] == [0.0]
+        if not rising or not all(map(math.isfinite, times)):
             raise ParameterError(f"times of switching {times}: have to rise from 0 s")
 
     @staticmethod

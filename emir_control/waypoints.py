@@ -16,6 +16,7 @@ from emir_control.trajectory import Braking, Motion, Reference
 
 Array = NDArray[np.float64]
 
+LONGEST = 300.0  # s of a motion: a stroke at a crawl; checking one takes no control period
 SPACING = 0.032  # s between the places of the curve that are checked
 NEAR = 5e-3  # m or rad, by which a first point at time 0 may be off the reference
 SLOWING = 0.75  # s in which the way along a curve is brought to rest
@@ -100,11 +101,17 @@ def _checked(points: Waypoints, axes: Sequence[Axis]) -> list[int]:
         raise WaypointError("velocities: not one for each joint in each point, nor none")
     if not all(np.isfinite(a).all() for a in (points.times, points.positions, points.velocities)):
         raise WaypointError("holds what is not a number")
-    if points.times[0] < 0.0 or (np.diff(points.times) <= 0.0).any():
-        raise WaypointError("time_from_start does not increase from point to point")
+    _check_times(points.times)
     if points.velocities.size and points.velocities[-1].any():
         raise WaypointError("does not end at rest")
     return [names.index(name) for name in known]
+
+
+def _check_times(times: Array) -> None:
+    if times[0] < 0.0 or (np.diff(times) <= 0.0).any():
+        raise WaypointError("time_from_start does not increase from point to point")
+    if times[-1] > LONGEST:
+        raise WaypointError(f"takes {times[-1]:.4g} s, longer than {LONGEST:g} s")
 
 
 def _rate(coordinate: Coordinate, now: Reference) -> float:

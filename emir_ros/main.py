@@ -18,7 +18,7 @@ from rclpy.task import Future
 
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
-from emir_ros.shell import NodeError, Shell
+from emir_ros.shell import NodeError, Shell, starting
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -123,8 +123,9 @@ def run(node_class: Callable[[], Shell]) -> None:
 def _run(node_class: Callable[[], Shell]) -> int:
     node: Shell | None = None
     try:
-        stop = start_ros()
-        node = node_class()
+        with starting():
+            stop = start_ros()
+            node = node_class()
         with make_executor() as executor:
             executor.add_node(node)
             keep_out_of_garbage_collection()

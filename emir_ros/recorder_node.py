@@ -18,6 +18,7 @@ from typing import Any
 from mcap.records import Attachment
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
+from rclpy.validate_node_name import validate_node_name
 from std_msgs.msg import Header, String
 
 from emir_analysis import parameter_files
@@ -59,6 +60,17 @@ FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
 
 
+def _description(text: str) -> dict[str, str]:
+    """Return the texts by key that a JSON holds; raises ParameterError for anything else."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+        raise ParameterError(f"recorder_node: description = {text!r}: not JSON of texts by key")
+    return found
+
+
 class RecorderNode(Shell):
     """Every topic of the table (or those named) -> recording, recorder/recorded."""
 
@@ -72,13 +84,16 @@ class RecorderNode(Shell):
         names: list[str] = declare(self, "topics", everything, "topics to record")
         about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
         nodes: list[str] = declare(self, "nodes", [""], "nodes whose parameters are recorded")
+        metadata = _description(about)
+        for node in filter(None, nodes):
+            validate_node_name(node)
         writer = self._make_writer(folder)
         reject_unknown(self)
         self._topics = [_known(name, self._table) for name in names]
         self._plant_topics = [topic for topic in self._topics if topic.every == "plant"]
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
         self._writer = writer()
-        self._writer.add_metadata("emir", json.loads(about))
+        self._writer.add_metadata("emir", metadata)
         ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._acknowledge = sender(ack)
         self._failed = False
@@ -126,6 +141,10 @@ class RecorderNode(Shell):
         """Write what is left and finish the file."""
         if self._failed:
             return
+        if not self.heard and not self.lockstep:  # `emir run` says itself why
+            first, *others = self._full_names.values()
+            count = f" and {len(others)} others" if others else ""
+            self.get_logger().warning(f"nothing is recorded: no message came of {first}{count}")
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
         self._events.write_all()

@@ -131,6 +131,9 @@ class ReplayNode(Shell):
 
     def _on_timer(self) -> None:
         now = time.monotonic()
+        if not self.active:  # the recording's time stands still
+            self._looked = now
+            return
         if not self._paused:
             rate: float = self.get_parameter("rate").value
             self._position += (now - self._looked) * rate * conversions.NANOSECONDS

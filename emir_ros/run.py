@@ -22,7 +22,7 @@ from emir_plant.plant import SimulationError
 from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
 from emir_ros.in_turn import spin_in_turn
 from emir_ros.main import make_executor, spin, start_ros, take_the_rest
-from emir_ros.shell import NodeError, Shell
+from emir_ros.shell import NodeError, Shell, starting
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
 TRAJECTORIES = "lift-lower, lower-lift, hold; of the robot also line"
@@ -104,13 +104,15 @@ def run_plan(plan: Plan, processes: str) -> int:
 
 
 def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
-    stop = start_ros()
+    with starting():
+        stop = start_ros()
     nodes: dict[str, Shell] = {}
     ended = Future()
     try:
         with make_executor() as executor:
             for name in plan.nodes:
-                nodes[name] = _node_class(name)(ros)
+                with starting():
+                    nodes[name] = _node_class(name)(ros)
                 nodes[name].ended.add_done_callback(lambda _: ended.set_result(None))
             recorder, *loops, plant = nodes.values()
             if plan.lockstep:

@@ -8,13 +8,17 @@ runs as fast as it can and the result does not depend on how fast that is.
 import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from emir_analysis.node_controls import NodeControl, Stepping
@@ -45,6 +49,9 @@ if TYPE_CHECKING:
     from rclpy.time import Time
 
 Signals = dict[str, float]
+
+SELDOM = 1.0  # s, between two lines about the same
+LONGEST_TIMEOUT = 60.0  # s
 
 
 class NodeError(RuntimeError):
@@ -81,6 +88,8 @@ class Shell(LifecycleNode):
         self.ended = Future()  # complete when the node is done or has failed
         self.active = False
         super().__init__(name, cli_args=None if arguments is None else list(arguments))
+        self._survive_bad_transitions()
+        self.add_on_set_parameters_callback(_keep_clock)
         self.lockstep: bool = declare(self, "lockstep", False, "step on stamps, not on a timer")
         known = {JOINT1: outputs} | ({} if robot is None else {ROBOT: robot})
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
@@ -95,6 +104,21 @@ class Shell(LifecycleNode):
             self.trigger_activate()
         elif self.lockstep:
             raise ParameterError(f"{name}: autostart: lock step needs every node from the start")
+
+    def _survive_bad_transitions(self) -> None:
+        """Refuse a transition that the state does not allow: rclpy would end the node with it."""
+        service = self._service_change_state
+        change = service.callback
+
+        def refuse_or_change(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except RuntimeError as error:  # rclpy's RCLError
+                self.get_logger().error(f"transition {request.transition.id}: {_line(error)}")
+                response.success = False
+                return response
+
+        service.callback = refuse_or_change
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take inputs and steps from now on."""
@@ -140,6 +164,8 @@ class Shell(LifecycleNode):
                 receive(data)
             except FAILURES as error:
                 self._fail(error)
+            except LookupError as error:
+                self.malformed(topic.name, error)
 
         subscription = super().create_subscription(
             conversions.message_class(topic.type),
@@ -152,6 +178,18 @@ class Shell(LifecycleNode):
         if not self.lockstep:
             watch = self._watch_input(topic, subscription.qos_profile.deadline.nanoseconds * 1e-9)
         return subscription
+
+    def malformed(self, topic: str, error: LookupError) -> None:
+        """Take no notice of a message that lacks a number: its input is then missing.
+
+        In lock step that would be waited for without end.
+        """
+        text = f"{topic}: {error.args[0]}"
+        if self.lockstep:
+            self._fail(NodeError(f"{self.get_name()}: {text}"))
+            return
+        self.diagnostics.counts["messages of another form"] += 1
+        self.get_logger().error(text, throttle_duration_sec=SELDOM)
 
     def _watch_input(self, topic: Topic, deadline: float) -> InputWatch:
         publishers = partial(self.count_publishers, topic.name)
@@ -264,6 +302,29 @@ class Shell(LifecycleNode):
         self._state_machine.destroy_when_not_in_use()
 
 
+def _keep_clock(parameters: list[Parameter]) -> SetParametersResult:
+    """Refuse another clock at run time: timers and the age of inputs are those of the first."""
+    if any(parameter.name == "use_sim_time" for parameter in parameters):
+        return SetParametersResult(successful=False, reason="use_sim_time is chosen at the start")
+    return SetParametersResult(successful=True)
+
+
+def _line(error: Exception) -> str:
+    """Return what rclpy says, in one line."""
+    return " ".join(str(error).split())
+
+
+@contextmanager
+def starting() -> Iterator[None]:
+    """Tell in one line, as a NodeError, what rclpy has against arguments, names and parameters."""
+    try:
+        yield
+    except FAILURES:
+        raise
+    except (RuntimeError, NameValidationException, ParameterException) as error:
+        raise NodeError(f"cannot start: {type(error).__name__}: {_line(error)}") from None
+
+
 def pressures(signals: Mapping[str, float]) -> dict[str, str]:
     """Return the measured pressures among the signals as texts with their unit."""
     return {
@@ -315,7 +376,12 @@ class ControlNode(Shell):
         self._inputs: dict[str, Topic] = {}
         self._fast_inputs = 0  # how many of them come every plant period
         about = "an older input is stale [s], real time"
-        self._timeout = Duration(seconds=declare(self, "input_timeout", self.timeout, about))
+        timeout: float = declare(self, "input_timeout", self.timeout, about)
+        if not 0.0 < timeout <= LONGEST_TIMEOUT:
+            raise ParameterError(
+                f"{name}: input_timeout = {timeout:g}: outside 0 ... {LONGEST_TIMEOUT:g} s"
+            )
+        self._timeout = Duration(seconds=timeout)
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
         for topic in inputs:

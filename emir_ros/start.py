@@ -1,30 +1,46 @@
 """`python -m emir_ros.start NAME ...`: run a node as `ros2 run emir_ros NAME ...` does.
 
-Loading a node's libraries takes a second or more, in which it may already be told to stop.
+With `run` as NAME, the graph as `emir run` does. Loading libraries takes a second or more, in
+which it may already be told to stop.
 """
 
+import os
 import signal
 import sys
 from importlib import import_module
 from importlib.util import find_spec
 from types import FrameType
 
+RUN = "run"
+INTERRUPTED = 130  # what a shell reports after Ctrl-C
+
 
 def main() -> None:
     """Load the node that the command line names and run it.
 
-    Exit code 0 if it is stopped meanwhile; 1 with one line where there is no such node.
+    Exit code 0 if it is stopped meanwhile, 130 for the graph; 1 with one line where there is no
+    such node.
     """
-    for stop in signal.SIGINT, signal.SIGTERM:
-        signal.signal(stop, _end)
     name = sys.argv.pop(1) if len(sys.argv) > 1 else ""
+    for stop in signal.SIGINT, signal.SIGTERM:
+        signal.signal(stop, _interrupt if name == RUN else _end)
+    if name == RUN:
+        graph = import_module("emir_ros.run").main
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        sys.exit(graph())
     if not name.endswith("_node") or find_spec(f"emir_ros.{name}") is None:
         sys.exit(f"emir_ros.start: {name or 'nothing'} given, not the name of a node")
     import_module(f"emir_ros.{name}").main()
 
 
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    sys.stderr.write("emir run: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
 def _end(_number: int, _frame: FrameType | None) -> None:
-    sys.exit(0)
+    os._exit(0)  # an exception may come out of a C library's loading as another one
 
 
 if __name__ == "__main__":

@@ -89,7 +89,11 @@ class ViewNode(Shell):
 
     def _listen(self, topic: Topic) -> None:
         def receive(message: Any) -> None:
-            self._signals.update(conversions.values(topic, message))
+            try:
+                self._signals.update(conversions.values(topic, message))
+            except LookupError as error:
+                self.malformed(topic.name, error)
+                return
             self._stamp = conversions.stamp_ns(message) / conversions.NANOSECONDS
 
         kind = conversions.message_class(topic.type)

@@ -19,6 +19,7 @@ DAMPINGS = np.geomspace(1.0, 1e-8, 5)  # of its steps, in units of the largest c
 REACH = 10.0  # standard deviations of a principal axis, over which a descent takes slopes ...
 LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
 FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
+BEYOND = 1e12  # times the noise: a run that is further off is out of all bounds
 TOLD = 1.0 + 1e-6  # times the curvature of what holds a parameter: more and the data tell of it
 KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
 EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
@@ -162,6 +163,16 @@ def _corrected(slopes: Array, step: Array, unforeseen: Array) -> Array:
     return np.asarray(slopes + np.where(_told(slopes), change, 0.0))
 
 
+def _bounded(model: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Return a model that cannot be simulated where it leaves all bounds: squares overflow."""
+
+    def bounded(points: Array) -> Array:
+        values = model(points)
+        return np.where(np.abs(values) < BEYOND, values, np.nan)
+
+    return bounded
+
+
 class _Held:
     """A problem's residuals, and behind them how far each parameter is from where it is held.
 
@@ -170,7 +181,8 @@ class _Held:
     """
 
     def __init__(self, problem: Problem, start: Array) -> None:
-        self._problem = problem
+        coarse = problem.coarse and _bounded(problem.coarse)
+        self._problem = replace(problem, model=_bounded(problem.model), coarse=coarse)
         self._weight = np.where(problem.stated, 1.0 / TOLERANCE_SPREAD, HELD)
         self._expected = np.where(problem.stated, 0.0, start)
 

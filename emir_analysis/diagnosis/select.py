@@ -111,7 +111,8 @@ def excess(tried: Trial, evidence: Evidence) -> float:
     Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
     """
     errors = np.concatenate(free_run_errors(tried.machine, evidence))
-    return float(np.mean(errors**2) - 1.0)
+    with np.errstate(over="ignore"):  # of a run out of all bounds
+        return float(np.mean(errors**2) - 1.0)
 
 
 def at_noise(tried: Trial, evidence: Evidence) -> bool:

@@ -141,3 +141,19 @@ def test_a_descent_goes_on_from_what_a_fit_to_a_part_of_the_data_knows(seed: int
     part = 0.25 * valley.curvature + np.eye(SIZE)  # half as well known, and held
     assert valley.excess(valley.start) > 50.0
     assert valley.excess(valley.descended(part).x) < 0.0
+
+
+@both
+def test_a_run_out_of_all_bounds_is_none(method: Method) -> None:
+    """Its square overflows. From there nothing begins, and beside a start it says nothing."""
+
+    def model(points: Array) -> Array:
+        wild = np.where(points[:, :1] > 1.0, 1e241, 1.0)
+        return np.asarray(wild * (points - 0.2) @ np.eye(2, 40, 1) * 30.0)
+
+    bounds, free = (np.full(2, -FAR), np.full(2, FAR)), np.zeros(2, dtype=bool)
+    lost = method(Problem(model, np.array([1.5, 0.0]), *bounds, free), 1e-3)
+    assert lost.misfit == np.inf
+    found = method(Problem(model, np.array([1.0 - 1e-9, 0.0]), *bounds, free), 1e-3)
+    assert np.all(np.isfinite(found.x))
+    assert found.x[1] == pytest.approx(0.2, abs=1e-3)

@@ -121,6 +121,8 @@ def test_one_that_follows_its_twin_offers_what_the_twin_commands() -> None:
         (("cascade", "magic"), ((0.0, "cascade"),), "controller 'magic': there are cascade, pfc"),
         (("cascade",), ((0.0, "pfc"),), "controller 'pfc': running are cascade"),
         (("cascade", "pfc"), ((1.0, "pfc"),), "have to rise from 0 s"),
+        (("cascade", "pfc"), ((0.0, "pfc"), (math.nan, "cascade")), "have to rise from 0 s"),
+        (("cascade", "pfc"), ((0.0, "pfc"), (math.inf, "cascade")), "have to rise from 0 s"),
         (("cascade", "pfc"), ((0.0, "pfc"), (2.0, "cascade"), (2.0, "pfc")), "have to rise"),
     ],
 )

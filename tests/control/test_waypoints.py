@@ -104,6 +104,7 @@ BAD: dict[str, tuple[Callable[[], Waypoints], str]] = {
     ),
     "nan": (lambda: _points([1.0], [np.nan]), "holds what is not a number"),
     "times": (lambda: _points([1.0, 1.0], [0.3, 0.31]), "time_from_start does not increase"),
+    "long": (lambda: _points([2e9], [0.3]), r"takes 2e\+09 s, longer than 300 s"),
     "end": (_without_end, "does not end at rest"),
     "begin": (lambda: _points([0.0, 5.0], [0.35, 0.4]), "begins 0.05 off where cylinder1's"),
     "range": (lambda: _points([30.0], [0.93]), r"cylinder1 leaves its range, 0.05 ... 0.9"),

@@ -32,6 +32,7 @@ from emir_msgs_py.topics import (
     PRESSURE_LOWERING,
     VALVE_COMMAND,
     VELOCITY_COMMAND,
+    Topic,
 )
 from emir_ros import qos
 from emir_ros.force_loop_node import TIMEOUT, ForceLoopNode
@@ -95,6 +96,10 @@ class Bench:
         for _ in range(4 * len(INPUTS)):  # what has come is taken, and a timer that is due
             self._executor.spin_once(timeout_sec=0.001)
 
+    def empty(self, topic: Topic) -> None:
+        """Publish a message of a topic that holds no numbers."""
+        self._inputs[topic.name].publish(conversions.message_class(topic.type)())
+
     def settle(self) -> None:
         """Run until the valve opens."""
         deadline = time.monotonic() + DEADLINE
@@ -136,6 +141,19 @@ def test_commands_late_by_100_ms_shut_the_valve_and_open_it_when_they_come(bench
     while bench.valve[-1] == 0.0:
         assert len(bench.valve) < before + 3
         bench.tick()
+
+
+def test_a_message_without_its_number_counts_as_none(bench: Bench) -> None:
+    """It ends no node; without another command the valve shuts, and opens when one comes."""
+    others = [topic for topic in INPUTS if topic is not VELOCITY_COMMAND]
+    deadline = time.monotonic() + DEADLINE
+    while bench.valve[-1] != 0.0:
+        assert time.monotonic() < deadline
+        bench.empty(VELOCITY_COMMAND)
+        bench.tick(others)
+    assert bench.loop.failure is None
+    assert bench.loop.diagnostics.counts["messages of another form"] > 0
+    bench.settle()
 
 
 @pytest.mark.parametrize("jump", [-HOUR // 2, HOUR], ids=["back", "forward"])

@@ -14,6 +14,7 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
@@ -65,6 +66,8 @@ def test_activated_and_deactivated_by_its_services() -> None:
         assert valve == []
         assert change(Transition.TRANSITION_ACTIVATE)
         until(lambda: valve and valve[-1] > 0.3)
+        assert not change(Transition.TRANSITION_CONFIGURE)  # an active one
+        assert not change(99)
         assert state() == State.PRIMARY_STATE_ACTIVE
         assert change(Transition.TRANSITION_DEACTIVATE)
         until(lambda: valve[-1] == 0.0)
@@ -78,6 +81,20 @@ def test_activated_and_deactivated_by_its_services() -> None:
     finally:
         for node in nodes:
             node.destroy_node()
+        rclpy.shutdown()
+
+
+def test_the_clock_stays_what_it_was_at_the_start() -> None:
+    """Else inputs would have no age where there is no /clock."""
+    rclpy.init()
+    node = ForceLoopNode()
+    try:
+        (answer,) = node.set_parameters([Parameter("use_sim_time", value=True)])
+        assert not answer.successful
+        assert "chosen at the start" in answer.reason
+        assert not node.get_parameter("use_sim_time").value
+    finally:
+        node.destroy_node()
         rclpy.shutdown()
 
 

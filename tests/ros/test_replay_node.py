@@ -114,6 +114,19 @@ def test_paused_it_stands_still_and_goes_on_from_there() -> None:
 
 
 @pytest.mark.usefixtures("ros")
+def test_inactive_it_publishes_nothing_and_begins_when_it_is_activated() -> None:
+    ticks: list[float] = []
+    listener, node = Listener(), _replay("autostart:=false")
+    listener.create_timer(0.02, lambda: ticks.append(time.monotonic()))
+    _spin([listener, node], lambda: listener.matched and len(ticks) > 20)
+    assert listener.clock == []
+    node.trigger_configure()
+    node.trigger_activate()
+    _spin([listener, node], lambda: listener.heard and listener.clock)
+    assert listener.clock[0] < 200_000_000  # and not the time that it was inactive
+
+
+@pytest.mark.usefixtures("ros")
 def test_the_speed_can_be_changed_on_the_way() -> None:
     listener, node = Listener(), _replay("rate:=0.1")
     _spin([listener, node], lambda: listener.clock)

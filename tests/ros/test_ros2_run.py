@@ -106,6 +106,8 @@ def test_node_starts_and_stops(
             process.kill()
     assert process.returncode == 0, said.read_text()
     assert "Traceback" not in said.read_text()
+    if name == "recorder_node":
+        assert "nothing is recorded: no message came of /joint_states" in said.read_text()
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=lambda s: str(s.name))
@@ -129,6 +131,66 @@ def test_what_is_no_node_is_refused_in_one_line(words: list[str]) -> None:
     assert finished.returncode == 1
     assert finished.stderr.endswith("given, not the name of a node\n")
     assert finished.stderr.count("\n") == 1
+
+
+def test_the_graph_told_to_stop_while_it_loads(tmp_path: Path) -> None:
+    slow = tmp_path / "numpy.py"  # in place of what it loads
+    slow.write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    command = [sys.executable, "-m", "emir_ros.start", "run", "--bag", str(tmp_path / "bag")]
+    here = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False, env=here
+    )
+    assert (finished.returncode, finished.stderr) == (130, "emir run: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--bogus"], "cannot start: UnknownROSArgsError"),
+        (["--params-file", "missing.yaml"], "missing.yaml"),
+        (["-p", "gain:=[1,2"], "gain:=[1,2"),
+        (["-r", "__ns:=1bad"], "__ns:=1bad"),
+        (["-p", "use_sim_time:=3"], "use_sim_time"),
+        (["-p", "input_timeout:=.nan"], "cascade_node: input_timeout = nan: outside 0 ... 60 s"),
+        (["-p", "input_timeout:=-1.0"], "cascade_node: input_timeout = -1: outside 0 ... 60 s"),
+    ],
+    ids=lambda value: value[-1] if isinstance(value, list) else "",
+)
+def test_bad_ros_arguments_are_refused_without_a_traceback(words: list[str], said: str) -> None:
+    """In one line of our own; rcl may log one before it."""
+    command = [sys.executable, "-m", "emir_ros.start", "cascade_node", "--ros-args", *words]
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
+    assert finished.returncode == 1
+    own = [line for line in finished.stderr.splitlines() if "[rcl]" not in line]
+    assert len(own) == 1
+    assert said in own[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-p", "description:=nojson"], "recorder_node: description = 'nojson': not JSON"),
+        (["-p", "description:='[1, 2]'"], "not JSON of texts by key"),
+        (["-p", "nodes:=[bad name]"], "bad name"),
+    ],
+    ids=lambda value: value[1] if isinstance(value, list) else "",
+)
+def test_a_recorder_that_cannot_start_leaves_no_folder(
+    words: list[str], said: str, tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    command = [sys.executable, "-m", "emir_ros.start", "recorder_node"]
+    finished = subprocess.run(
+        [*command, "--ros-args", "-p", f"bag:={bag}", *words],
+        capture_output=True, text=True, timeout=DEADLINE, check=False,
+    )  # fmt: skip
+    assert finished.returncode == 1
+    assert said in finished.stderr
+    assert "Traceback" not in finished.stderr
+    assert not bag.exists()
 
 
 STUCK = """

@@ -19,12 +19,13 @@ from emir_analysis.run_report import analyze, text
 from emir_analysis.switching import Switch
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
-from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, ros_arguments
+from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, read_parameters, ros_arguments
 from emir_ros.in_turn import spin_in_turn
 from emir_ros.main import make_executor, spin, start_ros, take_the_rest
 from emir_ros.shell import NodeError, Shell, starting
 
 INTERRUPTED = 130  # what a shell reports after Ctrl-C
+DEFAULT_TRAJECTORY = "lift-lower"
 TRAJECTORIES = "lift-lower, lower-lift, hold; of the robot also line"
 GRACE = 10.0  # s that a node has to end before it is killed
 
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     plan = Plan(
         bag=options.bag,
         controller=options.controller,
-        trajectory=options.trajectory,
+        trajectory=options.trajectory or DEFAULT_TRAJECTORY,
         duration=options.duration,
         params=options.params,
         lockstep=not options.realtime,
@@ -44,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     try:
         plan = replace(plan, switches=tuple(map(_switch, options.switch)))
+        if options.trajectory is None:
+            plan = replace(plan, trajectory=_trajectory(plan))
         check(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
@@ -54,6 +57,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def _trajectory(plan: Plan) -> str:
+    """Return the trajectory that the parameter file names, if it names one."""
+    own = read_parameters(plan.params).get("trajectory_node", {})
+    return str(own.get("trajectory", plan.trajectory))
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
     parser.add_argument("--model", default="joint1", help=", ".join(MODELS))
@@ -62,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         "--switch", action="append", default=[], metavar="S=NAME",
         help="to which controller at what time, while it moves; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--trajectory", default="lift-lower", help=TRAJECTORIES)
+    parser.add_argument("--trajectory", help=f"{TRAJECTORIES}; default: the file's, or lift-lower")
     parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
     pace = parser.add_mutually_exclusive_group()

@@ -49,6 +49,7 @@ from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    CYLINDER_REFERENCE,
     DIAGNOSTICS,
     PLANT_PERIOD_NS,
     TOPICS,
@@ -208,6 +209,24 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
         assert run_graph(["--duration", "2", "--bag", str(bag)]) == 0
         files.append((bag / "run_0.mcap").read_bytes())
     assert files[0] == files[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "moved"), [([], 0.0), (["--trajectory", "lift-lower", "--duration", "3"], 0.02)]
+)
+def test_the_parameter_files_trajectory_is_run_unless_another_is_asked_for(
+    words: list[str], moved: float, tmp_path: Path
+) -> None:
+    parameters, bag = tmp_path / "hold.yaml", tmp_path / "run"
+    parameters.write_text("trajectory_node: {ros__parameters: {trajectory: hold}}")
+    words = ["--duration", "1", "--params", str(parameters), "--bag", str(bag), *words]
+    assert run_graph(words) == 0
+    strokes = [
+        conversions.values(CYLINDER_REFERENCE, message)["reference_stroke"]
+        for _, message in _read_with_rosbags(bag)[f"/{CYLINDER_REFERENCE.name}"]
+    ]
+    assert max(strokes) - min(strokes) >= moved
+    assert (max(strokes) == min(strokes)) == (moved == 0.0)
 
 
 def test_nodes_that_live_in_the_lock_steps_time_do_not_wait_for_it(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 from emir_msgs_py.topics import JOINT_STATE, Field, Topic
@@ -43,8 +44,24 @@ def _steps(path: str) -> tuple[tuple[str, int | None], ...]:
 
 
 def values(topic: Topic, message: Any) -> dict[str, float]:
-    """Return the topic's signals by name; raises LookupError when a field is missing."""
-    return {name: _value(message, field) for name, field in topic.fields.items()}
+    """Return the topic's signals by name; raises LookupError when a field or a joint is missing."""
+    ordered = _in_order(topic, message)
+    return {name: _value(ordered, field) for name, field in topic.fields.items()}
+
+
+def _in_order(topic: Topic, message: Any) -> Any:
+    """Return a JointState's numbers in the topic's order; without names they are in that order."""
+    given = list(getattr(message, "name", ())) if topic.type == JOINT_STATE else []
+    if not given or given == list(topic.names):
+        return message
+    for name in topic.names:
+        if name not in given:
+            raise LookupError(f"the message has no {name}, but {', '.join(given)}")
+    order = [given.index(name) for name in topic.names]
+    arrays = {name: getattr(message, name) for name in ("position", "velocity", "effort")}
+    return SimpleNamespace(
+        **{name: [of[k] for k in order if k < len(of)] for name, of in arrays.items()}
+    )
 
 
 def _value(message: Any, field: Field) -> float:

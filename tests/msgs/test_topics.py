@@ -84,3 +84,25 @@ def test_velocity_command_without_forces_is_one_whose_forces_are_not_known() -> 
     assert all(told[f"{joint}_expected_force"] == 0.0 for joint in JOINTS)
     with pytest.raises(LookupError, match=r"no velocity\[0\]"):
         conversions.values(command, SimpleNamespace(velocity=[], effort=[]))
+
+
+def test_numbers_of_a_joint_state_belong_to_the_names_beside_them() -> None:
+    """As in every JointState: whoever sends them may have another order, and more joints."""
+    states = {topic.name: topic for topic in ROBOT_TOPICS}["joint_states"]
+    given = SimpleNamespace(
+        name=["gripper", *reversed(JOINTS)],
+        position=[9.0, *(0.1 * k for k in reversed(range(6)))],
+        velocity=[],
+        effort=[],
+    )
+    told = conversions.values(states, given)
+    assert [told[f"{joint}_angle"] for joint in JOINTS] == [0.1 * k for k in range(6)]
+    given.name[1] = "another"
+    with pytest.raises(LookupError, match=f"no {JOINTS[-1]}, but gripper, another"):
+        conversions.values(states, given)
+
+
+def test_a_command_to_another_valve_is_none_to_ours() -> None:
+    given = SimpleNamespace(name=["some_other_valve"], position=[0.6], velocity=[], effort=[])
+    with pytest.raises(LookupError, match="but some_other_valve"):
+        conversions.values(by_name("valve_command"), given)

@@ -165,6 +165,8 @@ class Shell(LifecycleNode):
             except FAILURES as error:
                 self._fail(error)
             except LookupError as error:
+                if type(error) is not LookupError:  # what looks up in vain is ours
+                    raise
                 self.malformed(topic.name, error)
 
         subscription = super().create_subscription(

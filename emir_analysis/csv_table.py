@@ -18,9 +18,9 @@ def read_columns(file: Path, wanted: Iterable[str]) -> dict[str, Array]:
     """Return the wanted columns by name, (n,) each.
 
     The first line names the columns, behind comments (#); comma, semicolon or tab stand between.
-    Where it is not a comma, a decimal comma is read, too. Columns that nobody
-    wants may hold anything. Raises InputError, naming file, line and column, for a file that
-    cannot be read, a missing header or column, rows of different length, text, blanks and NaN.
+    Where it is not a comma, a decimal comma is read, too. Columns that nobody wants may hold
+    anything. Raises InputError, naming file, line and column, for a file that cannot be read, a
+    missing header or column, rows of different length, text, blanks and NaN.
     """
     rows, point = _rows(file)
     if not rows:

@@ -23,8 +23,8 @@ from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, read_parameters, ro
 from emir_ros.in_turn import spin_in_turn
 from emir_ros.main import make_executor, spin, start_ros, take_the_rest
 from emir_ros.shell import NodeError, Shell, starting
+from emir_ros.start import INTERRUPTED
 
-INTERRUPTED = 130  # what a shell reports after Ctrl-C
 DEFAULT_TRAJECTORY = "lift-lower"
 TRAJECTORIES = "lift-lower, lower-lift, hold; of the robot also line"
 GRACE = 10.0  # s that a node has to end before it is killed

@@ -63,16 +63,16 @@ def best_swing(residual: Array, time: Array, predictors: dict[str, tuple[str, Ar
     length = float(time[-1] - time[0])
     frequencies = np.arange(1.0, HIGHEST * length, 1.0 / STEPS) / length
     signals = {"": ("1", np.zeros_like(time))} | predictors
+    basis = _basis(frequencies, time)
     shares = {
-        name: _shares(residual, _basis(frequencies, time), _bins(values))
-        for name, (_, values) in signals.items()
+        name: _shares(residual, basis, _bins(values)) for name, (_, values) in signals.items()
     }
     most = max(float(share.max()) for share in shares.values())
     name = next(name for name, share in shares.items() if share.max() > most - ALIKE)
     at = int(np.argmax(shares[name]))
     unit, values = signals[name]
     bins = _bins(values)
-    sizes = _fitted(residual, _basis(frequencies[at : at + 1], time), bins)[:, 0]
+    sizes = _fitted(residual, basis[:, :, at : at + 1], bins)[:, 0]
     table = tuple(
         (float(values[bins == k].mean()), float(a), float(np.hypot(b, c)))
         for k, (a, b, c) in enumerate(sizes)

@@ -85,7 +85,7 @@ def _angle_alone_turned(shown: Signals) -> Signals:
         (_exchanged, "pressure_lifting and pressure_lowering look exchanged"),
         (_turned("tip_deflection_angle"), "tip_deflection_angle has its sign turned round"),
         (_deflection_in(np.pi / 180.0), "tip_deflection_angle looks to be in deg"),
-        (_deflection_in(1e-3), "tip_deflection_angle (looks to be in mrad|reaches .* mrad)"),
+        (_deflection_in(1e-3), "tip_deflection_angle reaches .* is it in mrad"),
         (_turned("piston_stroke"), "piston_stroke has its sign turned round"),
         (_turned("valve_command"), "moves against valve_command"),
         (_turned("joint_angle"), "moves against valve_command"),

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
-from refused import refusal
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import rclpy
+from refused import refusal
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refused import refusal
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir_ros[robot]'")
 
+from refused import refusal
 from rosbags.highlevel import AnyReader
 
 from emir_analysis.cli import main as analyze

@@ -11,6 +11,7 @@ from functools import lru_cache, partial
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -89,12 +90,20 @@ class Trial:
         kept = np.array([u.path not in paths for u in self.unknowns.members], dtype=bool)
         members = tuple(u for u, stays in zip(self.unknowns.members, kept, strict=True) if stays)
         left = Unknowns(self.unknowns.machine, members)
-        return Trial(self.effects, left, self.x[kept], self.covariance[np.ix_(kept, kept)])
+        return Trial(self.effects, left, self.x[kept], _given(self.covariance, kept))
 
     def continued(self, solution: Solution) -> "Trial":
         """Return the trial with the parameters of a further fit."""
         k = len(self.unknowns.members)
         return Trial(self.effects, self.unknowns, solution.x[:k], solution.covariance[:k, :k])
+
+
+def _given(covariance: Array, kept: NDArray[np.bool_]) -> Array:
+    """Return the covariance of what is kept, the others being known."""
+    left = covariance[np.ix_(kept, kept)]
+    known = ~kept & np.isfinite(np.diag(covariance))
+    shared = covariance[np.ix_(kept, known)]
+    return np.asarray(left - shared @ np.linalg.pinv(covariance[np.ix_(known, known)]) @ shared.T)
 
 
 def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) -> Trial:

@@ -341,6 +341,19 @@ def test_a_share_is_none_or_all_where_the_recording_does_not_tell(
     assert ("effects.sensor_delay.dead_share" in members) == told
 
 
+def test_what_is_fixed_no_longer_widens_what_is_left() -> None:
+    """The curvature of a fit in which it is known lacks its row and column, nothing else."""
+    members = unknowns(Sheet(joint1(), {}, {}, ()), ("sensor_delay",))
+    count = len(members.members)
+    slopes = np.random.default_rng(3).standard_normal((2 * count, count))
+    curvature = slopes.T @ slopes
+    told = Trial(("sensor_delay",), members, members.start, np.linalg.inv(curvature))
+    share = [unknown.is_share for unknown in members.members].index(True)
+    kept = np.delete(np.delete(curvature, share, 0), share, 1)
+    found = told.fixed(members.members[share].path, 1.0).covariance
+    assert found == pytest.approx(np.linalg.inv(kept))
+
+
 def test_a_healthy_machine_keeps_no_effect() -> None:
     begun = search({})
     assert begun[0].needed(fitted(begun, "viscous_friction")).effects == ()

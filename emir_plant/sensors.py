@@ -81,10 +81,12 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
     }
     late = machine.effects.sensor_delay
     for name, index in _LATE.items():
-        if getattr(late, name) > 0.0:
+        delay = getattr(late, name)
+        if delay > 0.0:
             if state is None:
                 raise ValueError(f"effects.sensor_delay.{name}: the plant's state is needed")
-            true[name] = sensor_delay.shown(true[name], float(state[index]), late.dead_share)
+            lagging = float(state[index])
+            true[name] = sensor_delay.shown(true[name], lagging, delay, late.dead_share)
     shown = {name: _distorted(value, name, machine) for name, value in true.items()}
     angle = resolver(shown["angle"], sensors.resolver_bits, sensors.resolver_span)
     lifting = shown["pressure_lifting"] + sensors.pressure_noise * noise[0]
@@ -161,7 +163,7 @@ def _lagged(signal: Array, lag: float, period: float) -> Array:
     """Return a signal, (n,), behind a first-order lag, s, exactly for straight pieces."""
     if lag == 0.0:
         return signal
-    ratio = period / max(lag, sensor_delay.SHORTEST)
+    ratio = period / lag
     decay = math.exp(-ratio)
     mean = -math.expm1(-ratio) / ratio  # of the decay over a period
     start = (mean - decay) * signal[0] + decay * signal[0]

@@ -17,7 +17,8 @@ class SensorDelay(Effect):
     dead_share of T is dead time (sampling, bus), the rest a first-order lag (filter). The state
     of the integrated model has one number for each sensor: dead time acts there as the first-order
     system that agrees with it to the second power of T times the frequency; `sensors.readings`
-    has it exactly. A lag below SHORTEST acts as SHORTEST: the integration does not resolve it.
+    has it exactly. What is later by less than SHORTEST is a share of a lag of SHORTEST: the
+    integration does not resolve a shorter one.
     """
 
     balance: ClassVar[Balance] = "sensors"
@@ -50,23 +51,23 @@ class SensorDelay(Effect):
 def rate(true: float, lagging: float, delay: float, dead_share: float) -> float:
     """Return dz/dt of the state z of a sensor that shows late by a delay, s; signals in any unit.
 
-    (1 - a) T dz/dt = true - z, and the sensor shows z + a / (1 - a) (z - true).
+    L dz/dt = true - z, and the sensor shows z + (T / L - 1) (z - true), which is late by T.
     """
     if delay == 0.0:
         return 0.0
-    return (true - lagging) / max((1.0 - _ahead(dead_share)) * delay, SHORTEST)
+    return (true - lagging) / _lag(delay, dead_share)
 
 
-def shown(true: float, lagging: float, dead_share: float) -> float:
+def shown(true: float, lagging: float, delay: float, dead_share: float) -> float:
     """Return what a late sensor shows, from the truth and its state."""
-    ahead = _ahead(dead_share)
-    return lagging + ahead / (1.0 - ahead) * (lagging - true)
+    return lagging + (delay / _lag(delay, dead_share) - 1.0) * (lagging - true)
 
 
 @compiled
-def _ahead(dead_share: float) -> float:
-    """Return a of (1 - a T s) / (1 + (1 - a) T s), which is late by T whatever a.
+def _lag(delay: float, dead_share: float) -> float:
+    """Return L, s, of (1 - (T - L) s) / (1 + L s), which is late by T whatever L.
 
-    A lag has a = 0, dead time 1/2; between, the powers up to (T s)^2 are those of both in a row.
+    A lag has L = T, dead time T / 2; between, the powers up to (T s)^2 are those of both in a row.
     """
-    return dead_share * (1.0 - 0.5 * dead_share)
+    ahead = dead_share * (1.0 - 0.5 * dead_share)
+    return max((1.0 - ahead) * delay, SHORTEST)

@@ -23,6 +23,7 @@ from emir_plant.effects import (
     flow_gain_drift,
     linkage_error,
     logic_block_fault,
+    sensor_delay,
     terms,
     valve_hysteresis,
     vessel_compliance,
@@ -735,13 +736,18 @@ def test_a_sensor_of_dead_time_shows_what_was() -> None:
 
 
 @pytest.mark.parametrize("dead_share", [0.0, 0.3, 1.0])
-def test_a_late_sensor_shows_a_ramp_late_by_its_time(dead_share: float) -> None:
-    plant = _with(sensor_delay={"pressure_lifting": 0.05, "dead_share": dead_share})
+@pytest.mark.parametrize("delay", [1e-4, 0.05])
+def test_a_late_sensor_shows_a_ramp_late_by_its_time(delay: float, dead_share: float) -> None:
+    """Along a whole run, and by the plant's state, also where no step resolves the time."""
+    plant = _with(sensor_delay={"pressure_lifting": delay, "dead_share": dead_share})
     truth = np.zeros((500, len(Truth._fields)))
     truth[:, T["pressure_lifting"]] = ramp = np.arange(500) * 1e4
     shown = readings(plant, truth, 1e-2).pressure_lifting
     assert shown[0] == ramp[0]
-    assert shown[-1] == pytest.approx(ramp[-1] - 0.05 / 1e-2 * 1e4)
+    assert ramp[-1] - shown[-1] == pytest.approx(delay / 1e-2 * 1e4)
+    behind = 1e6 / sensor_delay.rate(1.0, 0.0, delay, dead_share)  # where the state rises as fast
+    by_state = sensor_delay.shown(ramp[-1], ramp[-1] - behind, delay, dead_share)
+    assert ramp[-1] - by_state == pytest.approx(delay * 1e6)
 
 
 def test_measuring_with_a_lagging_sensor_needs_the_state() -> None:

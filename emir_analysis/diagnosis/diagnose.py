@@ -26,13 +26,13 @@ class Findings:
     """What recordings say about the machine.
 
     verdict: nothing_missing, found, ambiguous or unexplained. refitted: parameters only, chosen:
-    with the effects named, both fitted to the whole recordings. rejected: effects that were best
-    among all and yet leave too much. tried: all trials. rivals: those as good as the chosen one.
-    residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted` and
-    `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks. speaking:
-    the balance that no effect takes down to the noise, the loudest or that which swings with
-    time, shape: of its residual, swing: how that swings, where: most of it lies. curve: what has
-    no name, with which `chosen` and `after` then are.
+    with the effects named, both fitted to the whole recordings. rejected: the trial whose effects
+    were best among all and yet leave too much. tried: all trials. rivals: those as good as the
+    chosen one. residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted`
+    and `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks.
+    speaking: the balance that no effect takes down to the noise, the loudest or that which swings
+    with time, shape: of its residual, swing: how that swings, where: most of it lies. curve: what
+    has no name, with which `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -40,7 +40,7 @@ class Findings:
     verdict: str
     refitted: Trial
     chosen: Trial
-    rejected: tuple[str, ...]
+    rejected: Trial | None
     tried: tuple[Tried, ...]
     rivals: tuple[Trial, ...]
     residuals: dict[str, Array]
@@ -79,7 +79,9 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         with_curve = curves.measured_instead(final)
         if with_curve is not None:
             verdict = "unexplained"
+    rejected = None
     if verdict == "unexplained":
+        rejected = final if final.effects else None
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
@@ -94,7 +96,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         verdict=verdict,
         refitted=refitted,
         chosen=final,
-        rejected=chosen.effects if verdict == "unexplained" else (),
+        rejected=rejected,
         tried=tuple(search.tried),
         rivals=tuple(best[1:]),
         residuals={"before": before, "refitted": unaided, "after": after},

@@ -24,7 +24,7 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
 )
 from emir_analysis.diagnosis.select import quiet
-from emir_analysis.diagnosis.shape import TOLD
+from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.statement import PARTS
 from emir_analysis.diagnosis.summary import cautions
 from emir_analysis.diagnosis.swing import Swing
@@ -144,7 +144,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
         what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
         blocks.append(
             Table(
-                (f"{shape.predictor}, {shape.unit}", "lowering", "lifting"),
+                (_over(shape), "lowering", "lifting"),
                 shape.table,
                 f"What is left in the balance {what}, against the signal that predicts it best "
                 f"({100 * shape.share:.0f} % of the variance in parts left out).",
@@ -153,18 +153,28 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
     return blocks
 
 
+def _over(function: Shape | Swing) -> str:
+    """Return of what signal it is a function."""
+    return (
+        f"{function.predictor}, {function.unit}" if function.predictor else "whatever the signals"
+    )
+
+
 def _swing(swing: Swing, findings: Findings, result: Diagnosis) -> list[Block]:
     """Return a picture of what swings with time, and a table of how much it does."""
     name = findings.speaking or ""
     unit = result.balances[name].unit
-    over = f"{swing.predictor}, {swing.unit}" if swing.predictor else "whatever the signals"
     told = (
         f"What is left in the balance {name} swings with a period of {swing.period:.3g} s "
         f"({100 * swing.share:.0f} % of the variance in parts left out)."
     )
     return [
         Picture(swing_picture(swing, findings), told),
-        Table((over, f"steady, {unit}", f"amplitude, {unit}"), swing.table, "The same in numbers."),
+        Table(
+            (_over(swing), f"steady, {unit}", f"amplitude, {unit}"),
+            swing.table,
+            "The same in numbers.",
+        ),
     ]
 
 

@@ -18,9 +18,10 @@ TOLD = 0.5  # share of the variance from which on a signal is said to predict a 
 class Shape:
     """A residual as a static function of one signal.
 
-    predictor: name of the signal. by_direction: one function for each sign of the velocity.
-    share: part of the residual's variance so predicted in parts of the recording left out.
-    table: rows (signal, mean residual while lowering, while lifting); NaN where never visited.
+    predictor: name of the signal, or nothing where it is a constant. by_direction: one function
+    for each sign of the velocity. share: part of the residual's variance so predicted in parts of
+    the recording left out. table: rows (signal, mean residual while lowering, while lifting); NaN
+    where never visited.
     """
 
     predictor: str
@@ -34,12 +35,14 @@ def best_shape(residual: Array, velocity: Array, predictors: dict[str, tuple[str
     """Return the static function of one signal that predicts a residual best.
 
     residual, velocity and the predictors' values: (w,). predictors: name -> (unit, values).
-    Of functions that predict alike the simpler one, without the direction, is taken.
+    Of functions that predict alike the simpler one, without the direction, is taken, and before
+    all a constant.
     """
     found: list[Shape] = []
+    signals = {"": ("1", np.zeros_like(residual))} | predictors
     for by_direction in (False, True):
         up = (velocity > 0.0) & by_direction
-        for name, (unit, values) in predictors.items():
+        for name, (unit, values) in (predictors if by_direction else signals).items():
             bins = _bins(values)
             share = _predicted_share(residual, bins, up)
             table = _table(residual, values, bins, velocity > 0.0)

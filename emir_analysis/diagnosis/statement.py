@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
@@ -16,6 +17,7 @@ from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.where import MOST, Where
+from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
@@ -60,8 +62,7 @@ def _of_findings(findings: Findings) -> str:
         if findings.curve is None:
             remainder += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
     if findings.verdict == "unexplained":
-        rejected = " and ".join(findings.rejected)
-        known = f"{rejected} comes closest but leaves too much; " if rejected else ""
+        known = "" if findings.rejected is None else f"{closest(findings.rejected)}; "
         left = remainder or "the balances are quiet, but the free run drifts away"
         return known + left + of_stamps(findings.evidence.experiments)
     if findings.verdict == "ambiguous":
@@ -118,7 +119,8 @@ def _judgement(findings: Findings, judged: Judged) -> str:
 
 def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
     effects = findings.chosen.machine.effects
-    on = [name for name in findings.rejected if getattr(effects, name).is_on]
+    rejected = () if findings.rejected is None else findings.rejected.effects
+    on = [name for name in rejected if getattr(effects, name).is_on]
     beside = f" beside {' and '.join(on)}" if on else ""
     most = {PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
     unit = "" if curve.part_unit == "1" else f" {curve.part_unit}"
@@ -157,16 +159,26 @@ def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
     if shape.share < TOLD:
         return "no single signal predicts it"
     direction = " and the direction of motion" if shape.by_direction else ""
-    return f"{shape.predictor}{direction} predicts {100 * shape.share:.0f} % of it"
+    return f"{shape.predictor or 'a constant'}{direction} predicts {100 * shape.share:.0f} % of it"
 
 
 def at_end(findings: Findings) -> tuple[str, ...]:
     """Return the parameters of a model that explains, but may do so by the wrong means."""
-    if findings.verdict == "unexplained":
-        return ()
-    chosen = findings.chosen
+    return () if findings.verdict == "unexplained" else _ends(findings.chosen)
+
+
+def _ends(chosen: Trial) -> tuple[str, ...]:
     together = zip(chosen.unknowns.members, chosen.x, strict=True)
     return tuple(unknown.path for unknown, x in together if unknown.at_end(float(x)))
+
+
+def closest(rejected: Trial) -> str:
+    """Return what comes closest, and which of its own parameters are as large as they can be."""
+    values = declared(rejected.machine)
+    ends = [path for path in _ends(rejected) if path.startswith("effects.")]
+    said = [f"{path} = {values[path][1]:.3g} {values[path][0].unit}" for path in ends]
+    led = f", {' and '.join(said)} at the end of what is looked for," if said else ""
+    return f"{' and '.join(rejected.effects)} comes closest{led} but leaves too much"
 
 
 def tell_apart(findings: Findings) -> str | None:

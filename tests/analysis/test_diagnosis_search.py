@@ -1,6 +1,7 @@
 """Where a run starts, and that only effects stay in a model which its recordings need."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -36,6 +37,7 @@ from emir_analysis.diagnosis.select import (
     speaks,
 )
 from emir_analysis.diagnosis.starts import Starts
+from emir_analysis.diagnosis.statement import closest
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_common.parameter_tree import with_values
@@ -339,6 +341,22 @@ def test_a_share_is_none_or_all_where_the_recording_does_not_tell(
     assert found.machine.effects.sensor_delay.dead_share == pytest.approx(share, abs=0.1)
     members = [unknown.path for unknown in found.unknowns.members]
     assert ("effects.sensor_delay.dead_share" in members) == told
+
+
+def test_a_size_as_large_as_is_looked_for_is_named_with_what_comes_closest() -> None:
+    """What is larger still is hidden; a size inside is not said, nor a parameter of the maker's."""
+    members = unknowns(Sheet(joint1(), TOLERANCES, {}, ()), ("sensor_bias",))
+    _, high = members.bounds
+    for path, said in (
+        ("effects.sensor_bias.pressure_lowering", ["pressure_lowering = 5e+06 Pa at the end"]),
+        (next(iter(TOLERANCES)), []),
+    ):
+        at = [member.path for member in members.members].index(path)
+        x = members.start
+        x[at] = high[at]
+        named = closest(Trial(("sensor_bias",), members, x, np.zeros((x.size, x.size))))
+        assert named.startswith("sensor_bias comes closest")
+        assert re.findall(r"pressure_lowering = .* at the end", named) == said
 
 
 def test_what_is_fixed_no_longer_widens_what_is_left() -> None:

@@ -69,3 +69,13 @@ def test_noise_and_wandering_without_a_period_are_no_swing(seed: int) -> None:
 def test_what_a_signal_predicts_is_no_swing() -> None:
     stroke = signals()["piston_stroke"][1]
     assert found(np.exp(-(((stroke - stroke.mean()) / 0.1) ** 2)) - 0.5) is None
+
+
+def test_what_is_always_the_same_is_a_constant_and_no_swing() -> None:
+    """As a bias of a pressure transducer is in the balance of forces."""
+    predictors = signals()
+    steady = 100.0 + NOISE * np.random.default_rng(1).standard_normal(TIME.size)
+    shape = best_shape(steady, predictors["valve_command"][1], predictors)
+    assert (shape.predictor, shape.by_direction) == ("", False)
+    assert shape.share == pytest.approx(1.0, abs=1e-4)
+    assert found(np.full_like(TIME, 100.0)) is None

@@ -196,9 +196,11 @@ class RecorderNode(Shell):
 
     def _write_complete_stamps(self) -> None:
         while self._described and len(self._pending[self._next]) == self._expected(self._next):
-            self._write_stamp(self._next)
-            if self._next % FLUSH_PERIOD_NS == 0:
+            whole_second = self._next % FLUSH_PERIOD_NS == 0
+            if whole_second:  # before what may begin a new file
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
+            self._write_stamp(self._next)
+            if whole_second:
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._acknowledge(header_message(self._next))

@@ -211,6 +211,17 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
+def test_a_recording_in_lock_step_is_split_by_its_own_time(tmp_path: Path) -> None:
+    """What the nodes said at first is written a second later, and in the first file."""
+    parameters, bag = tmp_path / "split.yaml", tmp_path / "run"
+    parameters.write_text("recorder_node: {ros__parameters: {max_duration: 1.0}}")
+    words = ["--params", str(parameters), "--duration", "2.4", "--bag", str(bag)]
+    assert run_graph(words) == 0
+    about = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    starts = [entry["starting_time"]["nanoseconds_since_epoch"] for entry in about["files"]]
+    assert starts == [0, 1_000_000_000, 2_000_000_000]
+
+
 @pytest.mark.parametrize(
     ("words", "moved"), [([], 0.0), (["--trajectory", "lift-lower", "--duration", "3"], 0.02)]
 )

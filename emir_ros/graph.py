@@ -207,6 +207,19 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
         yield ["--ros-args", *words]
 
 
+def unused(plan: Plan) -> str:
+    """Return what of the parameter file the run sets itself, to another value; "": nothing."""
+    run = _run_parameters(plan)
+    of_all = run[EVERY_NODE]["ros__parameters"]
+    found = []
+    for node, given in read_parameters(plan.params).items():
+        own = of_all | run.get(f"/**/{node}", {}).get("ros__parameters", {})
+        names = [name for name, value in given.items() if own.get(name, value) != value]
+        if names:
+            found.append(f"{node}: {', '.join(names)}")
+    return "; ".join(found)
+
+
 def _in_any_namespace(file: Path | None) -> dict[str, Any]:
     """Return a parameter file in which a node named without a path is meant wherever it is."""
     content = read_map(file, what="node") if file else {}

@@ -240,6 +240,29 @@ def test_the_parameter_files_trajectory_is_run_unless_another_is_asked_for(
     assert (max(strokes) == min(strokes)) == (moved == 0.0)
 
 
+def test_the_parameter_files_duration_is_run_unless_another_is_asked_for(tmp_path: Path) -> None:
+    parameters = tmp_path / "short.yaml"
+    parameters.write_text("plant_node: {ros__parameters: {duration: 0.64}}")
+    for words, wanted in (([], 640_000_000), (["--duration", "0.96"], 960_000_000)):
+        bag = tmp_path / str(wanted)
+        assert run_graph([*words, "--params", str(parameters), "--bag", str(bag)]) == 0
+        assert _read_with_rosbags(bag)["/truth"][-1][0] == wanted
+
+
+def test_what_the_run_does_not_take_from_the_parameter_file_is_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    parameters = tmp_path / "other.yaml"
+    parameters.write_text(
+        "/**: {ros__parameters: {lockstep: false, model: joint1}}\n"
+        "recorder_node: {ros__parameters: {bag: elsewhere, topics: [truth], max_size: 5.0}}\n"
+    )
+    words = ["--params", str(parameters), "--duration", "0.32", "--bag", str(tmp_path / "run")]
+    assert run_graph(words) == 0
+    said = "not used, the run sets it: /**: lockstep; recorder_node: bag, topics"
+    assert f"emir run: {parameters}: {said}\n" in capfd.readouterr().err
+
+
 def test_nodes_that_live_in_the_lock_steps_time_do_not_wait_for_it(tmp_path: Path) -> None:
     parameters, bag = tmp_path / "clock.yaml", tmp_path / "run"
     parameters.write_text("/**: {ros__parameters: {use_sim_time: true}}")
@@ -372,6 +395,11 @@ BAD = {
         [],
         "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}",
         "valve.dead_zone = 2",
+    ),
+    "plant's duration": (
+        [],
+        "plant_node: {ros__parameters: {duration: long}}",
+        "plant_node: duration = 'long': not a number",
     ),
     "type": ([], "cascade_node: {ros__parameters: {gain: high}}", "gain = 'high': not of type"),
     "unknown": (

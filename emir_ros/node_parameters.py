@@ -2,7 +2,8 @@
 
 import math
 from array import array
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -79,17 +80,24 @@ def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParam
     """
     about = "YAML made by emir design; empty or `scheduled`: those that come with the project"
     file = declare(node, "model_file", "", about)
-    try:
+    with naming(node):
         design = pfc_file.load(pfc_file.find(file, output), output)
         design = replace(
             design,
             form=declare(node, "form", design.form, ", ".join(get_args(Form))),
             future=declare(node, "future", design.future, ", ".join(get_args(Future))),
         )
-    except ParameterError as error:
-        name = f"{node.get_name()}: "
-        raise ParameterError(name + str(error).removeprefix(name)) from None
     return declare_tree(node, design, live=live)
+
+
+@contextmanager
+def naming(node: Node) -> Iterator[None]:
+    """Put the node's name in front of what is wrong with its parameters, if it is not there."""
+    name = f"{node.get_name()}: "
+    try:
+        yield
+    except ParameterError as error:
+        raise ParameterError(name + str(error).removeprefix(name)) from None
 
 
 def declare(node: Node, name: str, default: Any, description: str, *, fixed: bool = True) -> Any:

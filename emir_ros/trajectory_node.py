@@ -85,6 +85,7 @@ class TrajectoryNode(ControlNode):
     def _answer(self, verb: Any) -> Any:
         def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
+                self._need_to_be_active()
                 response.message, response.success = verb(), True
                 self.orders.tell(verb.__name__, {})
             except WaypointError as error:
@@ -93,9 +94,14 @@ class TrajectoryNode(ControlNode):
 
         return serve
 
+    def _need_to_be_active(self) -> None:
+        if not self.active:
+            raise WaypointError("inactive")
+
     def _on_waypoints(self, message: JointTrajectory) -> None:
         self.waypoints_heard += 1
         try:
+            self._need_to_be_active()
             points = _waypoints(message)
             self._follow(points)
         except WaypointError as error:

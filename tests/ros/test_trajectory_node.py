@@ -158,6 +158,23 @@ def test_hold_stop_and_start(model: str, front: str) -> None:
         assert again == pytest.approx(strokes[0], abs=1e-9)  # where the machine stands
 
 
+def test_inactive_it_takes_no_orders() -> None:
+    with _bench(JOINT1) as bench:
+        bench.run(1.6)
+        speed = bench.heard[-1]["reference_velocity"]
+        bench.node.trigger_deactivate()
+        bench.send(["cylinder1"], [[0.41]], [1.0])
+        bench.told("joint_trajectory rejected: inactive")
+        for verb in ("start", "hold", "stop"):
+            answer = bench.call(verb)
+            assert not answer.success
+            assert answer.message == "inactive"
+        bench.node.trigger_activate()
+        bench.run(0.5)
+        velocities = _of(bench.heard, "reference_velocity")[-15:]
+        assert velocities == pytest.approx(speed, rel=1e-9)  # as if nothing had been ordered
+
+
 def test_waypoints_in_strokes_and_in_angles() -> None:
     with _bench(JOINT1) as bench:
         bench.run(DT)

@@ -168,11 +168,17 @@ def _trajectory(values: Values) -> NodeControl:
 
 
 def _selector(values: Values) -> NodeControl:
+    for name in ("controllers", "switch_times", "switch_to"):
+        given = values.get(name, [])
+        if not isinstance(given, list) or any(isinstance(entry, list | dict) for entry in given):
+            raise ParameterError(f"{name} = {given!r}: not a list of numbers or names")
     names = values.pop("controllers", list(OUTER_LOOPS))
     times, switched = values.pop("switch_times", [0.0]), values.pop("switch_to", names[:1])
-    first = values.pop("controller", switched[0])
+    first = values.pop("controller", switched[0] if switched else "")
     for name in values:
         raise ParameterError(f"{name}: there is no such parameter")
+    if first not in names:
+        raise ParameterError(f"controller {first!r}: running are {', '.join(map(str, names))}")
     if len(times) != len(switched):
         raise ParameterError("switch_times and switch_to differ in length")
     switches = [Switch(*pair) for pair in zip(times, switched, strict=True)]

@@ -131,6 +131,28 @@ def test_bad_input_is_one_clear_line(case: str, capsys: pytest.CaptureFixture[st
     assert len(told.splitlines()) == 1
 
 
+BAD_NODES = {
+    "angle's type": ("plant", "initial_angle=high", "plant: initial_angle = 'high': not a number"),
+    "angle": ("plant", "initial_angle=5", "plant: boom angle 286.5 deg: outside the linkage's"),
+    "file": ("plant", "machine_file=5", "5: No such file"),
+    "list": ("selector", "controllers=5", "selector: controllers = 5: not a list"),
+    "times": ("selector", "switch_times=[[0]]", "switch_times = [[0]]: not a list of numbers"),
+    "controller": ("selector", "controller=foo", "selector: controller 'foo': running are"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_NODES)
+def test_a_value_of_another_kind_is_one_clear_line(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    node, value, said = BAD_NODES[case]
+    bag = _copy(tmp_path / "bag", {}, {"plant": _machine(), "selector": {}})
+    assert main(["replay", str(bag), "--node", node, "--set", value]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert len(told.splitlines()) == 1
+
+
 def test_a_broken_description_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = _copy(tmp_path / "bag", {"parameters": "[1, 2"})
     assert main(["replay", str(bag), "--node", "cascade"]) == 1

@@ -103,7 +103,12 @@ def check(plan: Plan) -> None:
             raise ParameterError(
                 f"{plan.params}: {node}: no such node; there are {', '.join(NODES)}"
             )
-    duration(plan)
+    end = duration(plan)
+    for switch in plan.switches:
+        if switch.time >= end:
+            raise ParameterError(
+                f"--switch {switch.time:g}={switch.name}: the run is over after {end:g} s"
+            )
 
 
 def _check_model(plan: Plan) -> None:

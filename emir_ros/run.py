@@ -1,6 +1,7 @@
 """`emir run`: start the graph, wait for the machine's run to end, stop it, show its figures."""
 
 import argparse
+import os
 import signal
 import subprocess
 import sys
@@ -215,9 +216,12 @@ def _stop(processes: Collection[subprocess.Popen[bytes]]) -> None:
 
 def _show(bag: Path) -> int:
     try:
-        print(text(analyze(bag)))  # noqa: T201 (a command prints)
+        print(text(analyze(bag)), flush=True)  # noqa: T201 (a command prints)
     except InputError as error:
         return _complain(str(error), 1)
+    except BrokenPipeError:  # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     return 0
 
 

@@ -390,6 +390,11 @@ BAD = {
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
     "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),
+    "late switch": (
+        ["--switch", "5=pfc", "--duration", "4.5"],
+        "",
+        "--switch 5=pfc: the run is over after 4.5 s",
+    ),
     "switch order": (["--switch", "2=pfc", "--switch", "1=cascade"], "", "have to rise from 0 s"),
     "range": (
         [],
@@ -491,6 +496,21 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     words = ["--params", str(again), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(tmp_path / "again")]) == 0  # it sets up the same run
     assert _raw(tmp_path / "again") == _raw(bag)
+
+
+def test_a_reader_that_has_seen_enough_gets_no_traceback(tmp_path: Path) -> None:
+    """As `emir run ... | head -0` does."""
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "emir_ros.run", "--duration", "0.5"]
+    with os.fdopen(write, "wb") as out:
+        finished = subprocess.run(
+            [*command, "--bag", str(tmp_path / "run")],
+            stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False,
+        )  # fmt: skip
+    assert finished.returncode == 1
+    assert "BrokenPipe" not in finished.stderr
+    assert _read_with_rosbags(tmp_path / "run").keys() == CASCADE_TOPICS
 
 
 def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> None:

@@ -21,7 +21,13 @@ from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
 from emir_ros.diagnostics import Level
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
+from emir_ros.node_parameters import (
+    declare,
+    declare_robot,
+    declare_tree,
+    naming,
+    reject_unknown,
+)
 from emir_ros.shell import ControlNode
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
@@ -42,12 +48,13 @@ class TrajectoryNode(ControlNode):
         name: str = declare(self, "trajectory", "lift-lower", known)
         move = declare_tree(self, TrajectoryParameters())
         self.law: Guidable
-        if self.model == ROBOT:
-            sheet = declare_robot(self)
-            path = declare_tree(self, path_parameters(sheet))
-            self.law = six(trajectory(sheet, name, move, path))
-        else:
-            self.law = mine(named(name, move))
+        with naming(self):
+            if self.model == ROBOT:
+                sheet = declare_robot(self)
+                path = declare_tree(self, path_parameters(sheet))
+                self.law = six(trajectory(sheet, name, move, path))
+            else:
+                self.law = mine(named(name, move))
         reject_unknown(self)
         self._name = self._doing = name
         self._stopped = False

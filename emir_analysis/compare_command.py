@@ -13,17 +13,23 @@ from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.errors import InputError
 from emir_analysis.node_controls import Stepping
+from emir_analysis.outputs import check_outputs
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1
 
+NO_CSV = "--csv is of a grid: of more than one case"
+
 Progress = Callable[[str], None]
 
 
 def command(options: Namespace, progress: Progress) -> str:
     """Run, draw, return the tables. Raises InputError or ParameterError."""
+    check_outputs([options.picture, options.csv], None, [options.pfc, options.pfc_tip])
+    if options.csv and (options.damping or options.trade_off):
+        raise InputError(NO_CSV)
     if options.damping:
         if options.picture:
             save(damping.picture(joint1()), options.picture)
@@ -39,6 +45,8 @@ def command(options: Namespace, progress: Progress) -> str:
     cases = _cases(options)
     if len(cases) > 1:
         return _grid(chosen, cases, options, progress)
+    if options.csv:
+        raise InputError(NO_CSV)
     return _one(chosen, cases[0], options, progress)
 
 

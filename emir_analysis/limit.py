@@ -4,6 +4,7 @@ Nothing is asked of valve, oil and controller but that the piston goes no faster
 flow moves it. What is left is the boom: a linear program (`emir_control/least_bending.py`).
 """
 
+import math
 from dataclasses import dataclass
 
 from emir_analysis.machine_model import boom, joint_rates
@@ -32,9 +33,15 @@ PAPER_MOVE = Trapezoid(0.06375, 0.025, 0.75)  # paper 3.2
 def turn(machine: Machine, move: Move) -> float:
     """Return by how much the joint turns in the move, rad.
 
-    Raises ParameterError where the piston would leave the triangle.
+    Raises ParameterError where the boom cannot stand or the piston would leave the triangle.
     """
     p = record(machine)[0]
+    lowest, highest = linkage.reach(p)
+    if not lowest < move.angle < highest:
+        raise ParameterError(
+            f"angle = {math.degrees(move.angle):g} deg: outside the linkage's reach,"
+            f" {math.degrees(lowest):.1f} ... {math.degrees(highest):.1f} deg"
+        )
     try:
         end = linkage.angle(linkage.stroke(move.angle, p) + move.stroke, p)
     except ValueError:

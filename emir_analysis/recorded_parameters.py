@@ -35,6 +35,11 @@ def recorded_parameters(bag: Path, node: str) -> Values:
     }
 
 
+def recorded_nodes(bag: Path) -> list[str]:
+    """Return the names of the nodes that told their parameters; []: the recording is older."""
+    return sorted(bags.metadata(bag).get(PARAMETERS, {}))
+
+
 def _as_set(bag: Path, node: str, about: Mapping[str, str]) -> Values:
     nodes = _json(bag, about.get("parameters", "{}"))
     try:

@@ -25,7 +25,7 @@ from emir_analysis.node_controls import (
 )
 from emir_analysis.parameter_files import unpacked
 from emir_analysis.recorded_orders import Obedience, orders
-from emir_analysis.recorded_parameters import Values, recorded_parameters
+from emir_analysis.recorded_parameters import Values, recorded_nodes, recorded_parameters
 from emir_analysis.replay_plant import replay_plant
 from emir_analysis.robot_replay import replay_robot
 from emir_analysis.run_signals import full_name
@@ -63,12 +63,15 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     """Feed a lock-step recording to a node's controller and compare the outputs.
 
     node: of NODES. changed: parameters by dotted name, over those of the recorded run. Raises
-    InputError for a recording without the node's topics or not in lock step, ParameterError for
-    a parameter that does not exist or is out of range.
+    InputError for a recording without the node or its topics or not in lock step, ParameterError
+    for a parameter that does not exist or is out of range.
     """
     if node not in NODES:
         raise InputError(f"--node {node}: there are {', '.join(NODES)}")
-    name = f"{node}_node"
+    name, there = f"{node}_node", recorded_nodes(bag)
+    if there and name not in there:
+        ran = ", ".join(known for known in NODES if f"{known}_node" in there)
+        raise InputError(f"{bag}: {node} was not in this run; it has parameters of {ran}")
     kind = replay_robot if full_name(TCP_POSE, bags.recorded_topics(bag)) else _replay_joint1
     with unpacked(bag, name, recorded_parameters(bag, name)) as values:
         return kind(bag, node, values, changed)
@@ -165,11 +168,17 @@ def _trajectory(values: Values) -> NodeControl:
 
 
 def _selector(values: Values) -> NodeControl:
+    for name in ("controllers", "switch_times", "switch_to"):
+        given = values.get(name, [])
+        if not isinstance(given, list) or any(isinstance(entry, list | dict) for entry in given):
+            raise ParameterError(f"{name} = {given!r}: not a list of numbers or names")
     names = values.pop("controllers", list(OUTER_LOOPS))
     times, switched = values.pop("switch_times", [0.0]), values.pop("switch_to", names[:1])
-    first = values.pop("controller", switched[0])
+    first = values.pop("controller", switched[0] if switched else "")
     for name in values:
         raise ParameterError(f"{name}: there is no such parameter")
+    if first not in names:
+        raise ParameterError(f"controller {first!r}: running are {', '.join(map(str, names))}")
     if len(times) != len(switched):
         raise ParameterError("switch_times and switch_to differ in length")
     switches = [Switch(*pair) for pair in zip(times, switched, strict=True)]

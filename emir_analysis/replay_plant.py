@@ -12,7 +12,7 @@ from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import PLANT_PERIOD_NS, TOPICS, TRUTH, VALVE_COMMAND
-from emir_plant.plant import Plant
+from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 
@@ -33,7 +33,7 @@ def replay_plant(
     """
     check_recorded(bag, recorded, START)
     values = {**recorded, **changed}
-    machine = load_sheet(Path(values[FILE])).machine if values.get(FILE) else joint1()
+    machine = load_sheet(Path(str(values[FILE]))).machine if values.get(FILE) else joint1()
     known = declared(machine)
     for name in changed:
         if name not in known and name not in {*START, FILE}:
@@ -48,8 +48,11 @@ def replay_plant(
         for stamp, signals in by_stamp(bag, (VALVE_COMMAND,), PLANT_PERIOD_NS).items()
     }
     check_start(bag, outputs, commands)
-    start = [float(values[name]) for name in START]
-    return compared(OUTPUTS, _rows(Plant(machine), start, commands, outputs))
+    start = [number(name, values[name]) for name in START]
+    try:
+        return compared(OUTPUTS, _rows(Plant(machine), start, commands, outputs))
+    except SimulationError as error:
+        raise ParameterError(f"plant: {error}") from None
 
 
 def check_recorded(bag: Path, values: Mapping[str, Any], needed: Collection[str]) -> None:
@@ -62,6 +65,13 @@ def check_start(bag: Path, outputs: Collection[int], commands: Collection[int]) 
     """Raise InputError where the recording, by its stamps, does not begin at the start."""
     if 0 not in outputs or 0 not in commands:
         raise InputError(f"{bag}: nothing at t = 0 s: not recorded in lock step?")
+
+
+def number(name: str, value: Any) -> float:
+    """Return a parameter of how the machine starts; raises ParameterError for no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError(f"plant: {name} = {value!r}: not a number")
+    return float(value)
 
 
 def finite(command: float) -> float:

@@ -88,7 +88,7 @@ def _control(node: str, values: dict[str, Any]) -> NodeControl:
         return RobotCascadeControl(Cascade(with_values(cascade_parameters(), values)))
     if node == "pfc":
         return RobotPfcControl(Pfc(with_values(pfc_parameters(), values)))
-    sheet = robot(*(Path(name) if name else None for name in (values.pop(f, "") for f in FILES)))
+    sheet = robot(*(Path(str(n)) if n else None for n in (values.pop(f, "") for f in FILES)))
     if node == "force_loop":
         return RobotForceLoopControl(with_values(force_loops(sheet), values))
     name = values.pop("trajectory", "lift-lower")

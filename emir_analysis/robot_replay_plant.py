@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.replay_plant import check_recorded, check_start, finite
+from emir_analysis.replay_plant import check_recorded, check_start, finite, number
 from emir_analysis.robot_machine import OUTPUTS, PLANT_PERIOD, commands, sensor_signals
 from emir_analysis.robot_setup import Posture
 from emir_analysis.stamped import FieldComparison, Signals, by_stamp, compared
@@ -15,6 +15,7 @@ from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_msgs_py.robot_topics import ROBOT_VALVE_COMMAND
 from emir_msgs_py.topics import PLANT_PERIOD_NS
+from emir_plant.plant import SimulationError
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.sheet import robot
 
@@ -37,7 +38,7 @@ def replay_robot_plant(
     """
     check_recorded(bag, values, (PRESSURE,))
     given = {**values, **changed}
-    machine = robot(*(Path(given[name]) if given.get(name) else None for name in FILES))
+    machine = robot(*(Path(str(given[name])) if given.get(name) else None for name in FILES))
     paths = {path.removeprefix(MAIN): path for path in declared(machine)}
     start = {f"{ANGLES}{joint}" for joint in declared(Posture())}
     for name in changed:
@@ -49,12 +50,16 @@ def replay_robot_plant(
         posture = with_values(Posture(), angles)
     except ParameterError as error:
         raise ParameterError(f"plant: {error}") from None
+    pressure = number(PRESSURE, given[PRESSURE])
     outputs = by_stamp(bag, OUTPUTS, PLANT_PERIOD_NS)
     orders = by_stamp(bag, (ROBOT_VALVE_COMMAND,), PLANT_PERIOD_NS)
     check_start(bag, outputs, orders)
     plant = RobotPlant(machine)
-    state = plant.initial(posture.angles, float(given[PRESSURE]))
-    return compared(OUTPUTS, _rows(plant, state, orders, outputs))
+    try:
+        state = plant.initial(posture.angles, pressure)
+        return compared(OUTPUTS, _rows(plant, state, orders, outputs))
+    except SimulationError as error:
+        raise ParameterError(f"plant: {error}") from None
 
 
 def _rows(

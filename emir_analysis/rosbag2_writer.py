@@ -132,6 +132,8 @@ class Rosbag2Writer:
     _attachments: list[Attachment] = field(default_factory=list, init=False)
     _finished: list[_File] = field(default_factory=list, init=False)
     _closed: bool = field(default=False, init=False)
+    _latest: int = field(default=0, init=False)  # log time so far, ns
+    _begin: int = field(default=0, init=False)  # the present file's, ns
 
     def __post_init__(self) -> None:
         if self.compression not in COMPRESSIONS:
@@ -254,16 +256,22 @@ class Rosbag2Writer:
         return whole
 
     def _is_full(self, time: int) -> bool:
-        span = self._file.span
-        if span.start is None:
+        """Return whether a message of that log time, ns, belongs into a new file.
+
+        A file's time counts from when it was begun: what comes late makes it no longer.
+        """
+        self._latest = max(self._latest, time)
+        if not self._file.writer.statistics.message_count:  # the first file's first
+            self._begin = time
             return False
-        too_long = (time - span.start) * 1e-9 >= self.max_duration
+        too_long = (time - self._begin) * 1e-9 >= self.max_duration
         return too_long or self._file.stream.tell() >= self.max_size
 
     def _split(self) -> None:
         self._file.finish()
         self._finished.append(self._file)
         self._file = self._next_file()
+        self._begin = self._latest
 
     def _next_file(self) -> _File:
         path = self.folder / f"{self.folder.name}_{len(self._finished)}.mcap"

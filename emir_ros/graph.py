@@ -3,7 +3,7 @@
 import json
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from emir_analysis.recorded_parameters import OF_A_TOPIC, OF_EVERY_NODE
-from emir_analysis.robot_setup import Posture, path_parameters, trajectory
+from emir_analysis.robot_setup import path_parameters, trajectory
 from emir_analysis.switching import Selector, Switch
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
@@ -24,6 +24,7 @@ from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS, VALVE_LOOPS
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
+from emir_ros.machines import Start
 
 CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
@@ -38,6 +39,7 @@ EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
 OF_THE_NODE = ("trajectory", *OF_EVERY_NODE)  # of trajectory_node, but not of its trajectory
 ROBOT_FILES = ("robot_file", "machine_file")
+KNOWN_TO_LINE = ("supply.p0", "geometry.payload", "effects.payload.mass")  # of the robot's plant
 ROBOT_CONTROLLERS = ("cascade", "pfc")
 
 
@@ -101,7 +103,12 @@ def check(plan: Plan) -> None:
             raise ParameterError(
                 f"{plan.params}: {node}: no such node; there are {', '.join(NODES)}"
             )
-    duration(plan)
+    end = duration(plan)
+    for switch in plan.switches:
+        if switch.time >= end:
+            raise ParameterError(
+                f"--switch {switch.time:g}={switch.name}: the run is over after {end:g} s"
+            )
 
 
 def _check_model(plan: Plan) -> None:
@@ -127,43 +134,46 @@ def duration(plan: Plan) -> float:
         for name, value in given_to_node.items()
         if name not in OF_THE_NODE and not name.startswith(OF_A_TOPIC)
     }
-    where = f"{plan.params}: trajectory_node: " if own else ""
-    try:
-        if plan.model == ROBOT:
-            takes = _robot_trajectory(plan, given, own)
-        else:
-            takes = _trajectory(plan, own)
-    except ParameterError as error:
-        raise ParameterError(f"{where}{error}") from None
+    takes = _robot_trajectory(plan, given, own) if plan.model == ROBOT else _trajectory(plan, own)
     return takes if plan.duration is None else plan.duration
 
 
 def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
     """Return how long joint 1's trajectory takes, s."""
-    return named(plan.trajectory, with_values(TrajectoryParameters(), own)).duration
+    with _told_by(plan, "trajectory_node", own):
+        return named(plan.trajectory, with_values(TrajectoryParameters(), own)).duration
 
 
 def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
     """Return how long the robot's trajectory takes, s, from where and with what it is to start."""
     own = {k: v for k, v in given.get(EVERY_NODE, {}).items() if k in ROBOT_FILES} | own
-    files = (Path(name) if name else None for name in (own.pop(key, "") for key in ROBOT_FILES))
-    sheet = robot(*files)
+    with _told_by(plan, "trajectory_node", own):
+        files = (own.pop(key, "") for key in ROBOT_FILES)
+        sheet = robot(*(Path(str(name)) if name else None for name in files))
     plant = given.get("plant_node", {})
-    path = path_parameters(sheet)
-    if own.get("weigh", path.weigh):
-        load = plant.get("geometry.payload", sheet.main.geometry.payload)
-        load += plant.get("effects.payload.mass", sheet.main.effects.payload.mass)
-        path = with_values(path, {"arm.payload": float(load)})
-    path = with_values(path, {"supply": float(plant.get("supply.p0", path.supply))})
-    of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
-    move = with_values(TrajectoryParameters(), own)
-    planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
-    front = "initial_angles."
-    angles = {
-        name.removeprefix(front): value for name, value in plant.items() if name.startswith(front)
-    }
-    start = RobotTrajectoryInputs(with_values(Posture(), angles).angles)
-    return planned.initial(start).timing.duration
+    with _told_by(plan, "plant_node", plant):
+        main = with_values(sheet.main, {k: v for k, v in plant.items() if k in KNOWN_TO_LINE})
+        angles = {k: v for k, v in plant.items() if k.startswith("initial_angles.")}
+        start = RobotTrajectoryInputs(with_values(Start(), angles).initial_angles.angles)
+        path = with_values(path_parameters(sheet), {"supply": main.supply.p0})
+        if own.get("weigh", path.weigh):
+            load = main.geometry.payload + main.effects.payload.mass
+            path = with_values(path, {"arm.payload": load})
+    with _told_by(plan, "trajectory_node", own):
+        of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
+        move = with_values(TrajectoryParameters(), own)
+        planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
+        return planned.initial(start).timing.duration
+
+
+@contextmanager
+def _told_by(plan: Plan, node: str, values: Collection[str]) -> Iterator[None]:
+    """Put file and node in front of what is wrong, where the file has values for the node."""
+    where = f"{plan.params}: {node}: " if values else ""
+    try:
+        yield
+    except ParameterError as error:
+        raise ParameterError(f"{where}{error}") from None
 
 
 def read_parameters(file: Path | None) -> dict[str, dict[str, Any]]:
@@ -205,6 +215,19 @@ def ros_arguments(plan: Plan) -> Iterator[list[str]]:
         if plan.namespace:
             words += ["-r", f"__ns:=/{plan.namespace}"]
         yield ["--ros-args", *words]
+
+
+def unused(plan: Plan) -> str:
+    """Return what of the parameter file the run sets itself, to another value; "": nothing."""
+    run = _run_parameters(plan)
+    of_all = run[EVERY_NODE]["ros__parameters"]
+    found = []
+    for node, given in read_parameters(plan.params).items():
+        own = of_all | run.get(f"/**/{node}", {}).get("ros__parameters", {})
+        names = [name for name, value in given.items() if own.get(name, value) != value]
+        if names:
+            found.append(f"{node}: {', '.join(names)}")
+    return "; ".join(found)
 
 
 def _in_any_namespace(file: Path | None) -> dict[str, Any]:

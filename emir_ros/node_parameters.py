@@ -2,7 +2,8 @@
 
 import math
 from array import array
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -11,12 +12,16 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
+from emir_analysis.recorded_parameters import OF_A_TOPIC
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError, Quantity
 from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
+from emir_msgs_py.robot_topics import ROBOT_TOPICS
+from emir_msgs_py.topics import TOPICS
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.sheet import robot
+from emir_ros import qos
 from emir_ros.live_parameters import is_live
 
 Tree = TypeVar("Tree")
@@ -75,17 +80,24 @@ def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParam
     """
     about = "YAML made by emir design; empty or `scheduled`: those that come with the project"
     file = declare(node, "model_file", "", about)
-    try:
+    with naming(node):
         design = pfc_file.load(pfc_file.find(file, output), output)
         design = replace(
             design,
             form=declare(node, "form", design.form, ", ".join(get_args(Form))),
             future=declare(node, "future", design.future, ", ".join(get_args(Future))),
         )
-    except ParameterError as error:
-        name = f"{node.get_name()}: "
-        raise ParameterError(name + str(error).removeprefix(name)) from None
     return declare_tree(node, design, live=live)
+
+
+@contextmanager
+def naming(node: Node) -> Iterator[None]:
+    """Put the node's name in front of what is wrong with its parameters, if it is not there."""
+    name = f"{node.get_name()}: "
+    try:
+        yield
+    except ParameterError as error:
+        raise ParameterError(name + str(error).removeprefix(name)) from None
 
 
 def declare(node: Node, name: str, default: Any, description: str, *, fixed: bool = True) -> Any:
@@ -117,23 +129,41 @@ def reject_unknown(node: Node) -> None:
     for name in node._parameter_overrides:  # noqa: SLF001
         if node.has_parameter(name) or name == "start_type_description_service":
             continue
-        of_a_topic = name.startswith("qos_overrides.")
-        if of_a_topic and node.get_parameter("lockstep").value:
-            raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
-        if not of_a_topic:  # of a topic that another node has
-            raise ParameterError(
-                f"{node.get_name()}: {name}: there is no such parameter;"
-                f" there are {', '.join(_known_beside(node, name))}"
-            )
+        if name.startswith(OF_A_TOPIC):
+            _check_override(node, name)
+        else:
+            raise _unknown(node, name, "parameter", _known_beside(node, name))
 
 
-def _known_beside(node: Node, name: str) -> list[str]:
+def _check_override(node: Node, name: str) -> None:
+    """Raise ParameterError for the quality of a topic that no node would take.
+
+    Another node may have the topic.
+    """
+    if node.get_parameter("lockstep").value:
+        raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
+    topic, *words = name.removeprefix(OF_A_TOPIC).split(".")
+    topics = {node.resolve_topic_name(known.name) for known in (*TOPICS, *ROBOT_TOPICS)}
+    if topic not in topics:
+        raise _unknown(node, name, "topic", topics)
+    keys = {f"{end}.{key}" for end in ("publisher", "subscription") for key in qos.OVERRIDABLE}
+    if ".".join(words) not in keys:
+        raise _unknown(node, name, "quality", keys)
+
+
+def _unknown(node: Node, name: str, what: str, known: Collection[str]) -> ParameterError:
+    """Return what says that there is none of that name, and which there are."""
+    there = ", ".join(sorted(known))
+    return ParameterError(f"{node.get_name()}: {name}: there is no such {what}; there are {there}")
+
+
+def _known_beside(node: Node, name: str) -> set[str]:
     """Return what the node has where an unknown dotted name leaves the known ones."""
     words = name.split(".")[:-1]
     while words and not node.get_parameters_by_prefix(".".join(words)):
         words.pop()
     known = node.get_parameters_by_prefix(".".join(words))
-    return sorted({path.partition(".")[0] for path in known})
+    return {path.partition(".")[0] for path in known}
 
 
 def describe(about: Quantity) -> str:

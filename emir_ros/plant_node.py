@@ -18,7 +18,7 @@ from emir_ros import qos
 from emir_ros.diagnostics import Beat, Level
 from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachine
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, declare_tree, reject_unknown
+from emir_ros.node_parameters import declare, declare_tree, naming, reject_unknown
 from emir_ros.shell import NodeError, Shell, Signals, pressures
 from emir_ros.wire import Wire, clock_message, sender, stamp_ns
 
@@ -52,7 +52,8 @@ class PlantNode(Shell):
         robot = self.model == ROBOT
         self.own = declare_tree(self, PlantNodeParameters())
         kind: Any = RobotMachine if robot else Joint1Machine
-        self.machine: Machine = kind(self, self.own.initial_pressure_lowering)
+        with naming(self):
+            self.machine: Machine = kind(self, self.own.initial_pressure_lowering)
         self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
         reject_unknown(self)
         self.tick = 0

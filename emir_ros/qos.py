@@ -18,6 +18,10 @@ DEPTH = 64  # plant periods: half a second of sensor data
 
 LEASE = Duration(seconds=1.0)  # after which a publisher without sign of life counts as dead
 
+OVERRIDABLE = (
+    "history", "depth", "reliability", "durability", "deadline", "liveliness_lease_duration",
+)  # fmt: skip
+
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # how rosbag2 writes "no limit"
 
 
@@ -61,13 +65,7 @@ def overridable(*, lockstep: bool) -> QoSOverridingOptions | None:
     """
     if lockstep:
         return None
-    kinds = QoSPolicyKind
-    return QoSOverridingOptions(
-        (
-            kinds.HISTORY, kinds.DEPTH, kinds.RELIABILITY, kinds.DURABILITY,
-            kinds.DEADLINE, kinds.LIVELINESS_LEASE_DURATION,
-        )
-    )  # fmt: skip
+    return QoSOverridingOptions([QoSPolicyKind[name.upper()] for name in OVERRIDABLE])
 
 
 def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:

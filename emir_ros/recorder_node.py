@@ -47,7 +47,7 @@ from emir_ros import qos
 from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
-from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.node_parameters import declare, naming, reject_unknown
 from emir_ros.parameter_record import ParameterRecord, as_metadata
 from emir_ros.picture import DESCRIPTION
 from emir_ros.recorded_events import RecordedEvents
@@ -92,7 +92,8 @@ class RecorderNode(Shell):
         self._topics = [_known(name, self._table) for name in names]
         self._plant_topics = [topic for topic in self._topics if topic.every == "plant"]
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
-        self._writer = writer()
+        with naming(self):
+            self._writer = writer()
         self._writer.add_metadata("emir", metadata)
         ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._acknowledge = sender(ack)
@@ -196,9 +197,11 @@ class RecorderNode(Shell):
 
     def _write_complete_stamps(self) -> None:
         while self._described and len(self._pending[self._next]) == self._expected(self._next):
-            self._write_stamp(self._next)
-            if self._next % FLUSH_PERIOD_NS == 0:
+            whole_second = self._next % FLUSH_PERIOD_NS == 0
+            if whole_second:  # before what may begin a new file
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
+            self._write_stamp(self._next)
+            if whole_second:
                 self._flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._acknowledge(header_message(self._next))

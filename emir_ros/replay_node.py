@@ -7,32 +7,42 @@ their recorded names, below the node's own namespace. Beginning and end are the 
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.records import Channel, Schema
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import ParameterException
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
-from emir_common.quantity import ParameterError
+from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError, quantity
 from emir_msgs_py import conversions
 from emir_ros import qos
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
 
 CLOCK = "/clock"
 PERIOD = 0.004  # s, of the computer's clock: half a period of the sensors
-SLOWEST, FASTEST = 0.01, 1000.0
 BURST = qos.DEPTH // 2  # messages of a topic at once: a reader's queue holds twice that
 PATIENCE = Duration(seconds=2.0)  # for the last messages to be received
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """How fast a recording is replayed."""
+
+    rate: float = quantity(
+        "1", 0.01, 1000.0, "speed against the recorded one; may be set at any time", default=1.0
+    )
 
 
 class Recorded(NamedTuple):
@@ -51,7 +61,8 @@ class ReplayNode(Shell):
         bag: str = declare(self, "bag", "", "recording to replay: a folder or an .mcap file")
         chosen: list[str] = declare(self, "topics", [""], "full names to replay; empty: all")
         self._paused: bool = declare(self, "start_paused", False, "wait for ~/pause false")
-        self._declare_rate()
+        declare_tree(self, Pace(), live=["rate"])
+        self.add_on_set_parameters_callback(self._check_pace)
         reject_unknown(self)
         if not bag:
             raise ParameterError("replay_node: bag: the recording to replay is missing")
@@ -72,16 +83,13 @@ class ReplayNode(Shell):
         for publisher in self._by_topic.values():
             publisher.wait_for_all_acked(PATIENCE)
 
-    def _declare_rate(self) -> None:
-        span = FloatingPointRange(from_value=SLOWEST, to_value=FASTEST, step=0.0)
-        about = "speed against the recorded one; may be changed while running"
-        descriptor = ParameterDescriptor(description=about, floating_point_range=[span])
+    def _check_pace(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse a speed out of range; rclpy looks at floats alone, and an integer will do."""
         try:
-            self.declare_parameter("rate", 1.0, descriptor)
-        except ParameterException:
-            raise ParameterError(
-                f"replay_node: rate: a number from {SLOWEST:g} to {FASTEST:g} is wanted"
-            ) from None
+            with_values(Pace(), {p.name: p.value for p in parameters if p.name == "rate"})
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def _open(self, bag: Path, chosen: set[str]) -> Iterator[Recorded]:
         try:

@@ -1,6 +1,7 @@
 """`emir run`: start the graph, wait for the machine's run to end, stop it, show its figures."""
 
 import argparse
+import os
 import signal
 import subprocess
 import sys
@@ -17,11 +18,21 @@ from rclpy.task import Future
 from emir_analysis.errors import InputError
 from emir_analysis.run_report import analyze, text
 from emir_analysis.switching import Switch
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
-from emir_ros.graph import CONTROLLERS, MODELS, Plan, check, read_parameters, ros_arguments
+from emir_ros.graph import (
+    CONTROLLERS,
+    MODELS,
+    Plan,
+    check,
+    read_parameters,
+    ros_arguments,
+    unused,
+)
 from emir_ros.in_turn import spin_in_turn
 from emir_ros.main import make_executor, spin, start_ros, take_the_rest
+from emir_ros.plant_node import PlantNodeParameters
 from emir_ros.shell import NodeError, Shell, starting
 from emir_ros.start import INTERRUPTED
 
@@ -47,9 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plan = replace(plan, switches=tuple(map(_switch, options.switch)))
         if options.trajectory is None:
             plan = replace(plan, trajectory=_trajectory(plan))
+        if options.duration is None:
+            plan = replace(plan, duration=_duration(plan))
         check(plan)
+        not_used = unused(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
+    if not_used:
+        sys.stderr.write(f"emir run: {plan.params}: not used, the run sets it: {not_used}\n")
     code = run_plan(plan, options.processes)
     if plan.bag.is_dir():  # what there is, however it ended
         shown = _show(plan.bag)
@@ -63,6 +79,16 @@ def _trajectory(plan: Plan) -> str:
     return str(own.get("trajectory", plan.trajectory))
 
 
+def _duration(plan: Plan) -> float | None:
+    """Return for how long the parameter file lets the machine run, s; None: it does not say."""
+    given = read_parameters(plan.params).get("plant_node", {})
+    wanted = {name: value for name, value in given.items() if name == "duration"}
+    try:
+        return with_values(PlantNodeParameters(), wanted).duration or None
+    except ParameterError as error:
+        raise ParameterError(f"{plan.params}: plant_node: {error}") from None
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
     parser.add_argument("--model", default="joint1", help=", ".join(MODELS))
@@ -72,7 +98,9 @@ def _parser() -> argparse.ArgumentParser:
         help="to which controller at what time, while it moves; may be repeated",
     )  # fmt: skip
     parser.add_argument("--trajectory", help=f"{TRAJECTORIES}; default: the file's, or lift-lower")
-    parser.add_argument("--duration", type=float, metavar="S", help="default: the trajectory's")
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="default: the file's, or the trajectory's"
+    )
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--realtime", action="store_true", help="as fast as the clock on the wall")
@@ -188,9 +216,12 @@ def _stop(processes: Collection[subprocess.Popen[bytes]]) -> None:
 
 def _show(bag: Path) -> int:
     try:
-        print(text(analyze(bag)))  # noqa: T201 (a command prints)
+        print(text(analyze(bag)), flush=True)  # noqa: T201 (a command prints)
     except InputError as error:
         return _complain(str(error), 1)
+    except BrokenPipeError:  # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     return 0
 
 

@@ -21,7 +21,13 @@ from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
 from emir_ros.diagnostics import Level
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
+from emir_ros.node_parameters import (
+    declare,
+    declare_robot,
+    declare_tree,
+    naming,
+    reject_unknown,
+)
 from emir_ros.shell import ControlNode
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
@@ -42,12 +48,13 @@ class TrajectoryNode(ControlNode):
         name: str = declare(self, "trajectory", "lift-lower", known)
         move = declare_tree(self, TrajectoryParameters())
         self.law: Guidable
-        if self.model == ROBOT:
-            sheet = declare_robot(self)
-            path = declare_tree(self, path_parameters(sheet))
-            self.law = six(trajectory(sheet, name, move, path))
-        else:
-            self.law = mine(named(name, move))
+        with naming(self):
+            if self.model == ROBOT:
+                sheet = declare_robot(self)
+                path = declare_tree(self, path_parameters(sheet))
+                self.law = six(trajectory(sheet, name, move, path))
+            else:
+                self.law = mine(named(name, move))
         reject_unknown(self)
         self._name = self._doing = name
         self._stopped = False
@@ -85,6 +92,7 @@ class TrajectoryNode(ControlNode):
     def _answer(self, verb: Any) -> Any:
         def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
+                self._need_to_be_active()
                 response.message, response.success = verb(), True
                 self.orders.tell(verb.__name__, {})
             except WaypointError as error:
@@ -93,9 +101,14 @@ class TrajectoryNode(ControlNode):
 
         return serve
 
+    def _need_to_be_active(self) -> None:
+        if not self.active:
+            raise WaypointError("inactive")
+
     def _on_waypoints(self, message: JointTrajectory) -> None:
         self.waypoints_heard += 1
         try:
+            self._need_to_be_active()
             points = _waypoints(message)
             self._follow(points)
         except WaypointError as error:

@@ -89,6 +89,8 @@ class ViewNode(Shell):
 
     def _listen(self, topic: Topic) -> None:
         def receive(message: Any) -> None:
+            if not self.active:
+                return
             try:
                 self._signals.update(conversions.values(topic, message))
             except LookupError as error:

@@ -224,6 +224,9 @@ def test_figures_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["--payload", "-1", "--controllers", "cascade"], "geometry.payload = -1"),
         (["--angle", "30", "45", "--repeat", "2"], "--repeat is for one case"),
         (["--error", "magic"], "model error 'magic': there are none; oil -20%"),
+        (["--angle", "45", "--csv", "moves.csv"], "--csv is of a grid"),
+        (["--damping", "--csv", "moves.csv"], "--csv is of a grid"),
+        (["--picture", "nowhere/x.png"], "nowhere/x.png: no such folder nowhere"),
         (["--size", "-3"], "size = -3 mm: outside 0 ... 1000 mm"),
     ],
 )

@@ -19,12 +19,15 @@ from emir_plant.sheet import joint1
 OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"
 
 
-def _copy(folder: Path, about: dict[str, str], plant: dict[str, float] | None = None) -> Path:
-    """The project's own recording with another description."""
+def _copy(
+    folder: Path, about: dict[str, str], nodes: dict[str, dict[str, float]] | None = None
+) -> Path:
+    """The project's own recording with another description, and what its nodes told."""
     with next(OWN_BAG.glob("*.mcap")).open("rb") as stream, Rosbag2Writer(folder) as writer:
         writer.add_metadata("emir", about)
-        if plant is not None:
-            writer.add_metadata("emir.parameters", {"plant_node": json.dumps(plant)})
+        if nodes is not None:
+            told = {f"{node}_node": json.dumps(values) for node, values in nodes.items()}
+            writer.add_metadata("emir.parameters", told)
         for schema, channel, message in make_reader(stream).iter_messages():
             assert isinstance(schema, Schema)
             if channel.topic not in writer.topics:
@@ -72,7 +75,7 @@ def test_the_machine_replays_what_another_computer_recorded(tmp_path: Path) -> N
 
     On the computer that recorded, every bit agrees: tests/ros/test_graph.py.
     """
-    fields = replay(_copy(tmp_path / "bag", {}, _machine()), "plant", {})
+    fields = replay(_copy(tmp_path / "bag", {}, {"plant": _machine()}), "plant", {})
     assert {len(field.recorded) for field in fields} == {401}  # 3.2 s / 8 ms and the first
     truth = [field for field in fields if field.topic == "truth"]
     assert len(truth) == 12
@@ -81,12 +84,24 @@ def test_the_machine_replays_what_another_computer_recorded(tmp_path: Path) -> N
 
 
 def test_a_heavier_machine_needs_a_higher_pressure(tmp_path: Path) -> None:
-    bag = _copy(tmp_path / "bag", {}, _machine())
+    bag = _copy(tmp_path / "bag", {}, {"plant": _machine()})
     fields = {f.name: f for f in replay(bag, "plant", {"effects.payload.mass": 500.0})}
     before, after = fields["pressure_lifting"].recorded, fields["pressure_lifting"].replayed
     torque = 500.0 * 9.81 * 22.5 * math.cos(math.pi / 4)  # N m
     force = torque / 0.63  # m, dh/dalpha at 45 deg
     assert after[0] - before[0] == pytest.approx(force / (math.pi / 4 * 0.28**2), rel=0.03)
+
+
+@pytest.mark.parametrize("more", [[], ["--set", "response_time=2.0"]])
+def test_a_node_that_was_not_in_the_run_is_told(
+    more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its inputs may have been: compared would be another controller's answers."""
+    bag = _copy(tmp_path / "bag", {}, {"trajectory": {}, "cascade": {"gain": 2.0}, "plant": {}})
+    assert main(["replay", str(bag), "--node", "pfc", *more]) == 1
+    told = capsys.readouterr().err
+    assert "pfc was not in this run; it has parameters of trajectory, cascade, plant" in told
+    assert main(["replay", str(bag), "--node", "cascade"]) == 0
 
 
 def test_a_recording_without_the_machines_parameters_says_so(
@@ -111,6 +126,28 @@ BAD = {
 def test_bad_input_is_one_clear_line(case: str, capsys: pytest.CaptureFixture[str]) -> None:
     words, said = BAD[case]
     assert main(["replay", str(OWN_BAG), *words]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert len(told.splitlines()) == 1
+
+
+BAD_NODES = {
+    "angle's type": ("plant", "initial_angle=high", "plant: initial_angle = 'high': not a number"),
+    "angle": ("plant", "initial_angle=5", "plant: boom angle 286.5 deg: outside the linkage's"),
+    "file": ("plant", "machine_file=5", "5: No such file"),
+    "list": ("selector", "controllers=5", "selector: controllers = 5: not a list"),
+    "times": ("selector", "switch_times=[[0]]", "switch_times = [[0]]: not a list of numbers"),
+    "controller": ("selector", "controller=foo", "selector: controller 'foo': running are"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_NODES)
+def test_a_value_of_another_kind_is_one_clear_line(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    node, value, said = BAD_NODES[case]
+    bag = _copy(tmp_path / "bag", {}, {"plant": _machine(), "selector": {}})
+    assert main(["replay", str(bag), "--node", node, "--set", value]) == 1
     told = capsys.readouterr().err
     assert said in told
     assert len(told.splitlines()) == 1

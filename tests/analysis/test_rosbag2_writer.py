@@ -61,6 +61,18 @@ def test_a_recording_split_by_time_is_one_to_its_readers(compression: str, tmp_p
         assert stored["emir"] == {"controller": "cascade"}
 
 
+def test_what_comes_late_makes_a_file_no_longer(tmp_path: Path) -> None:
+    """A message of the very beginning behind the first and behind others of every file."""
+    with Rosbag2Writer(tmp_path / "bag", max_duration=2.0) as writer:
+        writer.add_topic("/a", HEADER, {})
+        for k in range(6):
+            for at in (k, 0, k):
+                writer.write("/a", _header(at), at * SECOND, at * SECOND)
+    about = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
+    entries = about["rosbag2_bagfile_information"]["files"]
+    assert [entry["message_count"] for entry in entries] == [6, 6, 6]
+
+
 def test_a_file_that_has_grown_to_its_size_is_followed_by_another(tmp_path: Path) -> None:
     with Rosbag2Writer(tmp_path / "bag", max_size=1_200_000) as writer:
         writer.add_topic("/a", HEADER, {})

@@ -149,6 +149,7 @@ def test_limit_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
         (["--stroke", "500", "--duration", "1"], "no motion turns the joint"),
         (["--stroke", "9000"], "the triangle of joint 1 ends before"),
         (["--payload", "-3"], "geometry.payload = -3"),
+        (["--angle", "400"], "angle = 400 deg: outside the linkage's reach, -40.0 ... 140.0 deg"),
     ):
         assert main(["limit", *words]) == 1
         assert said in capsys.readouterr().err

@@ -152,6 +152,31 @@ def test_a_topics_quality_is_overridden_by_parameters() -> None:
         assert graph.nodes[0].get_parameter(f"{of}.depth").value == 3
 
 
+UNKNOWN = {
+    "quality": ("/valve_command.publisher.depht", "no such quality; there are publisher.deadline"),
+    "end": ("/valve_command.subscriber.depth", "no such quality; there are publisher.deadline"),
+    "topic": ("/valve.publisher.depth", "no such topic; there are /boom_deflection"),
+    "form": ("/valve_command", "no such quality; there are publisher.deadline"),
+}
+
+
+@pytest.mark.parametrize("case", UNKNOWN)
+def test_an_override_of_what_nobody_has_is_told(case: str) -> None:
+    name, said = UNKNOWN[case]
+    words = ["--ros-args", "-p", f"qos_overrides.{name}:=3"]
+    with _graph(), pytest.raises(ParameterError) as caught:
+        ForceLoopNode(words)
+    assert f"force_loop_node: qos_overrides.{name}: there is {said}" in str(caught.value)
+
+
+def test_an_override_may_be_given_to_nodes_without_the_topic() -> None:
+    """As `/**` of a parameter file does; the topic's name is that in the nodes' namespace."""
+    of = "qos_overrides./left/truth.publisher"
+    words = ["--ros-args", "-r", "__ns:=/left", "-p", f"{of}.depth:=3"]
+    with _graph(lambda: ForceLoopNode(words), lambda: PlantNode(words)) as graph:
+        assert graph.nodes[1].get_parameter(f"{of}.depth").value == 3
+
+
 def test_lock_step_takes_no_override() -> None:
     name = f"qos_overrides./{VALVE_COMMAND.name}.publisher.depth"
     words = ["--ros-args", "-p", "lockstep:=true", "-p", f"{name}:=3"]

@@ -211,6 +211,17 @@ def test_lockstep_recording_is_the_same_every_time(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
+def test_a_recording_in_lock_step_is_split_by_its_own_time(tmp_path: Path) -> None:
+    """What the nodes said at first is written a second later, and in the first file."""
+    parameters, bag = tmp_path / "split.yaml", tmp_path / "run"
+    parameters.write_text("recorder_node: {ros__parameters: {max_duration: 1.0}}")
+    words = ["--params", str(parameters), "--duration", "2.4", "--bag", str(bag)]
+    assert run_graph(words) == 0
+    about = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    starts = [entry["starting_time"]["nanoseconds_since_epoch"] for entry in about["files"]]
+    assert starts == [0, 1_000_000_000, 2_000_000_000]
+
+
 @pytest.mark.parametrize(
     ("words", "moved"), [([], 0.0), (["--trajectory", "lift-lower", "--duration", "3"], 0.02)]
 )
@@ -227,6 +238,29 @@ def test_the_parameter_files_trajectory_is_run_unless_another_is_asked_for(
     ]
     assert max(strokes) - min(strokes) >= moved
     assert (max(strokes) == min(strokes)) == (moved == 0.0)
+
+
+def test_the_parameter_files_duration_is_run_unless_another_is_asked_for(tmp_path: Path) -> None:
+    parameters = tmp_path / "short.yaml"
+    parameters.write_text("plant_node: {ros__parameters: {duration: 0.64}}")
+    for words, wanted in (([], 640_000_000), (["--duration", "0.96"], 960_000_000)):
+        bag = tmp_path / str(wanted)
+        assert run_graph([*words, "--params", str(parameters), "--bag", str(bag)]) == 0
+        assert _read_with_rosbags(bag)["/truth"][-1][0] == wanted
+
+
+def test_what_the_run_does_not_take_from_the_parameter_file_is_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    parameters = tmp_path / "other.yaml"
+    parameters.write_text(
+        "/**: {ros__parameters: {lockstep: false, model: joint1}}\n"
+        "recorder_node: {ros__parameters: {bag: elsewhere, topics: [truth], max_size: 5.0}}\n"
+    )
+    words = ["--params", str(parameters), "--duration", "0.32", "--bag", str(tmp_path / "run")]
+    assert run_graph(words) == 0
+    said = "not used, the run sets it: /**: lockstep; recorder_node: bag, topics"
+    assert f"emir run: {parameters}: {said}\n" in capfd.readouterr().err
 
 
 def test_nodes_that_live_in_the_lock_steps_time_do_not_wait_for_it(tmp_path: Path) -> None:
@@ -356,11 +390,21 @@ BAD = {
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
     "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),
+    "late switch": (
+        ["--switch", "5=pfc", "--duration", "4.5"],
+        "",
+        "--switch 5=pfc: the run is over after 4.5 s",
+    ),
     "switch order": (["--switch", "2=pfc", "--switch", "1=cascade"], "", "have to rise from 0 s"),
     "range": (
         [],
         "plant_node: {ros__parameters: {valve: {dead_zone: 2.0}}}",
         "valve.dead_zone = 2",
+    ),
+    "plant's duration": (
+        [],
+        "plant_node: {ros__parameters: {duration: long}}",
+        "plant_node: duration = 'long': not a number",
     ),
     "type": ([], "cascade_node: {ros__parameters: {gain: high}}", "gain = 'high': not of type"),
     "unknown": (
@@ -452,6 +496,21 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
     words = ["--params", str(again), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(tmp_path / "again")]) == 0  # it sets up the same run
     assert _raw(tmp_path / "again") == _raw(bag)
+
+
+def test_a_reader_that_has_seen_enough_gets_no_traceback(tmp_path: Path) -> None:
+    """As `emir run ... | head -0` does."""
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "emir_ros.run", "--duration", "0.5"]
+    with os.fdopen(write, "wb") as out:
+        finished = subprocess.run(
+            [*command, "--bag", str(tmp_path / "run")],
+            stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False,
+        )  # fmt: skip
+    assert finished.returncode == 1
+    assert "BrokenPipe" not in finished.stderr
+    assert _read_with_rosbags(tmp_path / "run").keys() == CASCADE_TOPICS
 
 
 def test_two_machines_in_one_domain_do_not_hear_each_other(tmp_path: Path) -> None:

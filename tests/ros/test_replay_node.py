@@ -85,7 +85,7 @@ def _spin(nodes: list[Any], until: Callable[[], object]) -> None:
 @pytest.mark.usefixtures("ros")
 def test_every_message_arrives_as_it_was_recorded() -> None:
     recorded = _recorded()
-    listener, node = Listener(), _replay("rate:=5.0", "start_paused:=true")
+    listener, node = Listener(), _replay("rate:=5", "start_paused:=true")
     _spin([listener, node], lambda: listener.matched and listener.clock)
     listener.pause.call_async(SetBool.Request(data=False))
     _spin(
@@ -132,7 +132,11 @@ def test_the_speed_can_be_changed_on_the_way() -> None:
     _spin([listener, node], lambda: listener.clock)
     (refused,) = node.set_parameters([Parameter("rate", value=-1.0)])
     assert not refused.successful
-    (accepted,) = node.set_parameters([Parameter("rate", value=500.0)])
+    for bad in (-1, 2000, "fast"):
+        (refused,) = node.set_parameters([Parameter("rate", value=bad)])
+        assert not refused.successful
+        assert "rate = " in refused.reason
+    (accepted,) = node.set_parameters([Parameter("rate", value=500)])  # no need of 500.0
     assert accepted.successful
     started = time.monotonic()
     _spin([listener, node], lambda: node.done)
@@ -143,7 +147,8 @@ BAD = {
     "no bag": ("bag:=''", "bag: the recording to replay is missing"),
     "nowhere": ("bag:=nowhere", "nowhere: no such recording"),
     "topic": ("topics:=['/speed']", "topic /speed is not recorded; there are: /boom_deflection"),
-    "rate": ("rate:=-1.0", "rate: a number from 0.01 to 1000 is wanted"),
+    "rate": ("rate:=-1.0", "replay_node: rate = -1: outside 0.01 ... 1000"),
+    "rate's type": ("rate:=fast", "replay_node: rate = 'fast': not of type float"),
 }
 
 

@@ -148,7 +148,37 @@ BAD = {
     "posture": (
         ["--trajectory", "hold"],
         "plant_node: {ros__parameters: {initial_angles: {joint3: 1.5}}}",
-        r"joint 3: 85.9 deg is outside the linkage's reach, -61.1 \.\.\. 72.6 deg",
+        r"yaml: plant_node: joint 3: 85.9 deg is outside the linkage's reach, -61.1 \.\.\. 72.6",
+    ),
+    "angle": (
+        [],
+        "plant_node: {ros__parameters: {initial_angles: {joint3: 5.0}}}",
+        r"params.yaml: plant_node: initial_angles.joint3 = 5: outside -3.2 \.\.\. 3.2 rad",
+    ),
+    "angle's name": (
+        [],
+        "plant_node: {ros__parameters: {initial_angles: {joint9: 0.5}}}",
+        "params.yaml: plant_node: initial_angles.joint9: there is no such parameter",
+    ),
+    "payload's type": (
+        [],
+        "plant_node: {ros__parameters: {geometry.payload: heavy}}",
+        "params.yaml: plant_node: geometry.payload = 'heavy': not a number",
+    ),
+    "payload": (
+        [],
+        "plant_node: {ros__parameters: {geometry.payload: 2000.0, effects.payload.mass: 2000.0}}",
+        "params.yaml: plant_node: arm.payload = 4000: outside",
+    ),
+    "pressure's type": (
+        [],
+        "plant_node: {ros__parameters: {supply.p0: high}}",
+        "params.yaml: plant_node: supply.p0 = 'high': not a number",
+    ),
+    "file's type": (
+        [],
+        "trajectory_node: {ros__parameters: {robot_file: 5}}",
+        "params.yaml: trajectory_node: 5: No such file",
     ),
     "line": (
         ["--trajectory", "line"],

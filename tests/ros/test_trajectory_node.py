@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from emir_analysis.robot_setup import Posture
+from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.robot_topics import (
     JOINTS,
@@ -156,6 +157,34 @@ def test_hold_stop_and_start(model: str, front: str) -> None:
         assert _of(bench.heard, velocity)[-1] > 0.02
         again = _of(bench.heard, stroke)[-round(1.0 / DT)]
         assert again == pytest.approx(strokes[0], abs=1e-9)  # where the machine stands
+
+
+@pytest.mark.parametrize("model", [JOINT1, ROBOT])
+def test_an_unknown_trajectory_is_told_by_the_node(model: str) -> None:
+    words = ["-p", f"model:={model}", "-p", "trajectory:=loop"]
+    rclpy.init()
+    try:
+        with pytest.raises(ParameterError, match=r"^trajectory_node: trajectory 'loop': there are"):
+            TrajectoryNode(["--ros-args", *words])
+    finally:
+        rclpy.shutdown()
+
+
+def test_inactive_it_takes_no_orders() -> None:
+    with _bench(JOINT1) as bench:
+        bench.run(1.6)
+        speed = bench.heard[-1]["reference_velocity"]
+        bench.node.trigger_deactivate()
+        bench.send(["cylinder1"], [[0.41]], [1.0])
+        bench.told("joint_trajectory rejected: inactive")
+        for verb in ("start", "hold", "stop"):
+            answer = bench.call(verb)
+            assert not answer.success
+            assert answer.message == "inactive"
+        bench.node.trigger_activate()
+        bench.run(0.5)
+        velocities = _of(bench.heard, "reference_velocity")[-15:]
+        assert velocities == pytest.approx(speed, rel=1e-9)  # as if nothing had been ordered
 
 
 def test_waypoints_in_strokes_and_in_angles() -> None:

@@ -5,7 +5,7 @@ import math
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -22,9 +22,10 @@ from emir_analysis.view.robot import TOPICS as ROBOT_LIVE
 from emir_common.quantity import ParameterError
 from emir_msgs_py.robot_topics import JOINTS
 from emir_msgs_py.topics import CYLINDER_STATES, JOINT1, JOINT_STATES, PRESSURE_LIFTING, ROBOT
+from emir_ros import qos
 from emir_ros.shell import Shell
+from emir_ros.view_node import PERIOD, ViewNode
 from emir_ros.view_node import SHOWN as LIVE
-from emir_ros.view_node import ViewNode
 
 SENT = [JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING]
 SIGNALS = {"angle": 0.8, "stroke": 0.3, "force": 1e5, "pressure_lifting": 1.1e7}
@@ -58,6 +59,32 @@ def test_the_page_shows_what_is_published(port: int) -> None:
         executor.spin_once(timeout_sec=0.05)
     assert f"| joint angle | {math.degrees(0.8):.2f} | deg |" in view.shown
     assert "| valve | - | % |" in view.shown  # nobody publishes it
+    view.close()
+
+
+def test_inactive_it_takes_nothing_in(port: int) -> None:
+    view = ViewNode(["--ros-args", "-p", f"port:={port}", "-p", "autostart:=false"])
+    machine, ticks, heard = Shell("machine", SENT), [], []
+    machine.hear(CYLINDER_STATES, heard.append, qos.requested(CYLINDER_STATES, lockstep=False))
+    machine.create_timer(PERIOD, lambda: ticks.append(time.monotonic()))
+    executor = SingleThreadedExecutor()
+    for node in (view, machine):
+        executor.add_node(node)
+    deadline, stamps = time.monotonic() + DEADLINE, itertools.count(8_000_000, 8_000_000)
+
+    def publish_until(condition: Callable[[], bool]) -> None:
+        while not condition():
+            assert time.monotonic() < deadline
+            machine.publish(CYLINDER_STATES, next(stamps), SIGNALS)
+            executor.spin_once(timeout_sec=0.05)
+
+    publish_until(lambda: len(heard) > 20)
+    ticks.clear()
+    publish_until(lambda: len(ticks) > 5)  # the page's own timer has come as often
+    assert "300.0" not in view.shown
+    view.trigger_configure()
+    view.trigger_activate()
+    publish_until(lambda: "300.0" in view.shown)
     view.close()
 
 

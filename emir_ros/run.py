@@ -58,8 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plan = replace(plan, switches=tuple(map(_switch, options.switch)))
         if options.trajectory is None:
             plan = replace(plan, trajectory=_trajectory(plan))
-        if options.duration is None:
-            plan = replace(plan, duration=_duration(plan))
+            if options.duration is None:  # the file's is that of its own trajectory
+                plan = replace(plan, duration=_duration(plan))
         check(plan)
         not_used = unused(plan)
     except ParameterError as error:
@@ -99,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--trajectory", help=f"{TRAJECTORIES}; default: the file's, or lift-lower")
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="default: the file's, or the trajectory's"
+        "--duration", type=float, metavar="S", help="default: the file's, or that of --trajectory"
     )
     parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
     pace = parser.add_mutually_exclusive_group()

@@ -99,7 +99,10 @@ class Trial:
 
 
 def _given(covariance: Array, kept: NDArray[np.bool_]) -> Array:
-    """Return the covariance of what is kept, the others being known."""
+    """Return the covariance of what is kept, (j, j), the others being known.
+
+    covariance: (k, k); of what the data do not tell it is infinite, before any fit NaN. kept: (k,).
+    """
     left = covariance[np.ix_(kept, kept)]
     known = ~kept & np.isfinite(np.diag(covariance))
     shared = covariance[np.ix_(kept, known)]

@@ -59,7 +59,7 @@ def rate(true: float, lagging: float, delay: float, dead_share: float) -> float:
 
 
 def shown(true: float, lagging: float, delay: float, dead_share: float) -> float:
-    """Return what a late sensor shows, from the truth and its state."""
+    """Return what a sensor late by a delay, s, shows, from the truth and its state z."""
     return lagging + (delay / _lag(delay, dead_share) - 1.0) * (lagging - true)
 
 

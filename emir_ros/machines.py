@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from rclpy.node import Node
 
+from emir_analysis.node_controls import Signals
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import GROUND, ROBOT_VALVE_COMMAND
@@ -32,7 +33,6 @@ from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros.node_parameters import declare, declare_robot, declare_tree
 from emir_ros.picture import Picture
-from emir_ros.shell import Signals
 
 JOINT1_OUTPUTS = (
     JOINT_STATES,

@@ -8,7 +8,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from emir_msgs_py.conversions import NANOSECONDS
+from emir_msgs_py.conversions import set_stamp
 from emir_msgs_py.topics import DIAGNOSTICS
 from emir_ros import qos
 
@@ -82,7 +82,7 @@ class Diagnostics:
             return
         level, message = self._said
         array: Any = DiagnosticArray()
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._now(), NANOSECONDS)
+        set_stamp(array, self._now())
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(level=bytes([level]), name=name, message=message)
         found = {**self.figures(), **{key: str(n) for key, n in sorted(self.counts.items())}}

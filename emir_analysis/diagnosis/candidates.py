@@ -137,7 +137,7 @@ def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
 
     def model(points: Array) -> Array:
         missing = evidence.residuals([start.unknowns.at(x) for x in points])
-        return np.asarray((missing / floor)[:, :, evidence.fitted].reshape(len(points), -1))
+        return evidence.in_noise(missing, floor)
 
     low, high = start.unknowns.bounds
     problem = Problem(model, start.x, low, high, start.unknowns.toleranced)

@@ -31,7 +31,7 @@ from emir_control.trajectory import (
     TrajectoryInputs,
     TrajectoryState,
 )
-from emir_control.waypoints import Along, Axis, Coordinate, Followed, Waypoints, curve
+from emir_control.waypoints import Along, Axis, Direct, Followed, Linkage, Waypoints, curve
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CASCADE_TERMS,
@@ -113,18 +113,6 @@ class PlansMoves(NodeControl, Protocol):
         """Return the next state while another drives, and what is offered. state None: begin."""
 
 
-class _Piston:
-    """A stroke given as such."""
-
-    def stroke(self, angle: float) -> float:
-        """Return the stroke."""
-        return angle
-
-    def angle(self, stroke: float) -> float:
-        """Return the stroke."""
-        return stroke
-
-
 class _Boom:
     """A stroke given by the angle of joint 1."""
 
@@ -139,14 +127,14 @@ class _Boom:
         return joint_angle(stroke, self.linkage)
 
 
-def _axis(name: str, coordinate: Coordinate) -> Axis:
+def _axis(name: str, linkage: Linkage) -> Axis:
     limits = LimitParameters()
     margin = limits.end_margin
     low, high = limits.stroke_low + margin, limits.stroke_high - margin
-    return Axis(name, coordinate, low, high, limits.speed)
+    return Axis(name, linkage, low, high, limits.speed)
 
 
-JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", _Piston()), _axis("joint1", _Boom())
+JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", Direct()), _axis("joint1", _Boom())
 
 
 @dataclass(frozen=True)

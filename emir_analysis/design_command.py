@@ -46,6 +46,11 @@ def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
         raise ParameterError(f"controller {options.controller!r}: there are {known}")
+    return _pfc(options, progress, recorded=recorded)
+
+
+def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool) -> str:
+    """As `command`, of a predictive controller; recorded: from a recording."""
     output = OUTPUTS[options.controller]
     task = DesignTask(
         controller=options.controller,

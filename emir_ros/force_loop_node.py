@@ -13,7 +13,7 @@ from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT, SELECTOR_TERMS
-from emir_ros.control_node import ControlNode
+from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown

@@ -15,7 +15,7 @@ from emir_msgs_py.topics import ORDERS
 from emir_ros import qos
 
 if TYPE_CHECKING:
-    from emir_ros.control_node import ControlNode
+    from emir_ros.control_shell import ControlNode
 
 
 class Orders:

@@ -19,6 +19,7 @@ from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
 from emir_analysis.errors import InputError
+from emir_msgs_py.conversions import stamp_ns
 
 RECORD = struct.Struct("<BQ")  # opcode and length of any record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
@@ -243,10 +244,7 @@ def _messages(file: Path, topics: Collection[str] | None) -> Iterator[tuple[str,
 
 
 def _header_stamp(data: Any, log_time: int) -> int:
-    header = getattr(data, "header", None)
-    if header is None:
-        return log_time
-    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+    return log_time if getattr(data, "header", None) is None else stamp_ns(data)
 
 
 def _sequence(stream: IO[bytes]) -> Iterator[McapRecord]:

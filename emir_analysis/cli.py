@@ -274,34 +274,7 @@ def _disturb(words: list[str]) -> int:
 def _design(words: list[str]) -> int:
     from emir_analysis.design_command import command
 
-    parser = argparse.ArgumentParser(prog="emir design")
-    parser.add_argument(
-        "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
-        help="YAML of the machine or recording of a run; default: EMIR's joint 1",
-    )  # fmt: skip
-    parser.add_argument("--controller", default="pfc", help="pfc (default), pfc_tip, lqg, mpc")
-    parser.add_argument(
-        "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
-    )
-    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
-    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
-    parser.add_argument(
-        "--observer", type=float, default=0.0, metavar="M/S",
-        help="Kalman filter in place of an independent model: unknown input's change per sample",
-    )  # fmt: skip
-    parser.add_argument(
-        "--schedule", action="store_true",
-        help="models over posture and payload, which the controller reads off the static force",
-    )  # fmt: skip
-    parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
-    parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
-    parser.add_argument(
-        "--oil-tolerance", type=float, default=0.2, metavar="X",
-        help="of lqg and mpc: by how much the oil's stiffness may differ from the stated one",
-    )  # fmt: skip
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
-    print(command(parser.parse_args(words), _progress))
+    print(command(words, _progress))
     return 0
 
 

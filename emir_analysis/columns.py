@@ -42,7 +42,7 @@ def read(path: Path, wanted: Mapping[str, Collection[str]]) -> dict[str, Columns
     for name, topic in topics.items():
         if not topic.log_times:
             raise bags.not_recorded(path, name)
-    return {name: topic.columns(path) for name, topic in topics.items()}
+    return {name: topic.columns() for name, topic in topics.items()}
 
 
 def _read(file: Path, topics: Mapping[str, "_Topic"]) -> None:
@@ -77,7 +77,7 @@ class _Topic:
     stamps: list[Times] = field(default_factory=list)
     pieces: list[Values] = field(default_factory=list)
 
-    def columns(self, path: Path) -> Columns:
+    def columns(self) -> Columns:
         log_time, stamp = np.concatenate(self.log_times), np.concatenate(self.stamps)
         table = np.concatenate(self.pieces, axis=1)
         self.pieces.clear()

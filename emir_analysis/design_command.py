@@ -1,8 +1,8 @@
 """`emir design`: a controller from a machine's model, as a file that the node loads."""
 
 import math
-from argparse import Namespace
-from collections.abc import Callable
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from emir_analysis import design_lqg
@@ -35,8 +35,9 @@ RECORDED_ORDER = 4  # an ordinary run tells no more than the integrator and the 
 COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 
-def command(options: Namespace, progress: Callable[[str], None]) -> str:
+def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
     """Design, check, write the file; return what to tell. Raises InputError, ParameterError."""
+    options = _parser().parse_args(words)
     recorded = _is_recording(Path(options.machine))
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
@@ -45,6 +46,11 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
         raise ParameterError(f"controller {options.controller!r}: there are {known}")
+    return _pfc(options, progress, recorded=recorded)
+
+
+def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool) -> str:
+    """As `command`, of a predictive controller; recorded: from a recording."""
     output = OUTPUTS[options.controller]
     task = DesignTask(
         controller=options.controller,
@@ -81,6 +87,37 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
         f"{found_model}"
         f"largest |z| of the closed loop's poles (- : no such motion):\n{as_text(found)}"
     )
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(prog="emir design")
+    parser.add_argument(
+        "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
+        help="YAML of the machine or recording of a run; default: EMIR's joint 1",
+    )  # fmt: skip
+    parser.add_argument("--controller", default="pfc", help="pfc (default), pfc_tip, lqg, mpc")
+    parser.add_argument(
+        "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
+    )
+    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
+    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
+    parser.add_argument(
+        "--observer", type=float, default=0.0, metavar="M/S",
+        help="Kalman filter in place of an independent model: unknown input's change per sample",
+    )  # fmt: skip
+    parser.add_argument(
+        "--schedule", action="store_true",
+        help="models over posture and payload, which the controller reads off the static force",
+    )  # fmt: skip
+    parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
+    parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
+    parser.add_argument(
+        "--oil-tolerance", type=float, default=0.2, metavar="X",
+        help="of lqg and mpc: by how much the oil's stiffness may differ from the stated one",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
+    return parser
 
 
 def _is_recording(path: Path) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from emir_analysis.errors import InputError
 from emir_analysis.machine_model import lqg_parameters
+from emir_analysis.outputs import write_text
 from emir_common.quantity import ParameterError
 from emir_control.lqg import LqgParameters
 from emir_control.softness import Case, Robustness
@@ -64,10 +64,7 @@ def _write(options: Namespace, values: dict[str, float]) -> None:
     words = f"--from {options.machine} --controller {options.controller}"
     made_by = f"# emir design {words} --oil-tolerance {options.oil_tolerance:g}\n"
     file, content = options.out, {f"{options.controller}_node": {"ros__parameters": values}}
-    try:
-        file.write_text(made_by + yaml.safe_dump(content), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    write_text(file, made_by + yaml.safe_dump(content))
 
 
 def _table(values: NDArray[np.float64]) -> str:

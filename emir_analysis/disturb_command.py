@@ -17,11 +17,10 @@ from emir_analysis.disturbance import LoadChange, push
 from emir_analysis.limit import PAPER_MOVE
 from emir_analysis.node_controls import Stepping
 from emir_analysis.report import new_figure
-from emir_analysis.yardstick import EVERYDAY, controllers
+from emir_analysis.yardstick import EVERYDAY, controllers, turned_off
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_plant import linkage
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import joint1
@@ -111,10 +110,7 @@ def _figures(machine: Machine, case: Case, signals: Run) -> tuple[Array, Array]:
         after = with_values(machine, {"geometry.payload": case.change})
         sag[round(case.time / PLANT_PERIOD) :] = _sag(after)
     bending = signals["tcp_deflection"] - sag * np.cos(angle)
-    p = Plant(machine).record[0]
-    wanted = np.array([linkage.angle(h, p) for h in signals["reference_stroke"]])
-    turned = machine.geometry.boom_length * (angle[::TICKS] - wanted)
-    return np.asarray(bending), np.asarray(turned + bending[::TICKS])
+    return np.asarray(bending), turned_off(machine, signals) + np.asarray(bending[::TICKS])
 
 
 def _sag(machine: Machine) -> float:

@@ -141,9 +141,5 @@ def _delayed(signal: Array, samples: int) -> Array:
 
 def difference(one: InternalModel, other: InternalModel, frequencies: Sequence[float]) -> Array:
     """Return |G_1 - G_2| / |G_2| at frequencies, Hz."""
-    points = np.exp(2j * np.pi * np.array(frequencies) * one.period)
-    first, second = (
-        np.array([m.C @ np.linalg.solve(z * np.eye(m.order) - m.A, m.B) for z in points])
-        for m in (one, other)
-    )
+    first, second = (m.frequency_response(np.array(frequencies)) for m in (one, other))
     return np.asarray(np.abs(first - second) / np.abs(second))

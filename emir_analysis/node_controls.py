@@ -31,7 +31,7 @@ from emir_control.trajectory import (
     TrajectoryInputs,
     TrajectoryState,
 )
-from emir_control.waypoints import Along, Axis, Coordinate, Followed, Waypoints, curve
+from emir_control.waypoints import Along, Axis, Direct, Followed, Linkage, Waypoints, curve
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
     CASCADE_TERMS,
@@ -113,18 +113,6 @@ class PlansMoves(NodeControl, Protocol):
         """Return the next state while another drives, and what is offered. state None: begin."""
 
 
-class _Piston:
-    """A stroke given as such."""
-
-    def stroke(self, angle: float) -> float:
-        """Return the stroke."""
-        return angle
-
-    def angle(self, stroke: float) -> float:
-        """Return the stroke."""
-        return stroke
-
-
 class _Boom:
     """A stroke given by the angle of joint 1."""
 
@@ -139,14 +127,14 @@ class _Boom:
         return joint_angle(stroke, self.linkage)
 
 
-def _axis(name: str, coordinate: Coordinate) -> Axis:
+def _axis(name: str, linkage: Linkage) -> Axis:
     limits = LimitParameters()
     margin = limits.end_margin
     low, high = limits.stroke_low + margin, limits.stroke_high - margin
-    return Axis(name, coordinate, low, high, limits.speed)
+    return Axis(name, linkage, low, high, limits.speed)
 
 
-JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", _Piston()), _axis("joint1", _Boom())
+JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", Direct()), _axis("joint1", _Boom())
 
 
 @dataclass(frozen=True)
@@ -226,7 +214,7 @@ class PfcControl:
         inputs = self._inputs(signals)
         law: Any = self.pfc
         state, outputs = law.step(state or law.initial(inputs), inputs, dt)
-        return state, pfc_signals("pfc", outputs)
+        return state, signals_of(outputs, "pfc", "velocity_command")
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -261,7 +249,7 @@ class PfcTipControl:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
         state, outputs = self.tip.step(state or self.tip.initial(inputs), inputs, dt)
-        return state, pfc_signals("pfc_tip", outputs)
+        return state, signals_of(outputs, "pfc_tip", "velocity_command")
 
     def follow(self, state: Any, signals: Signals, command: float, dt: float) -> Any:
         """Return the next state when that command was applied in this period."""
@@ -310,7 +298,7 @@ class LqgControl:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
-        return state, _lqg_signals(self.name, outputs) | self._offered(outputs.valve_command)
+        return state, self._signals(outputs, outputs.valve_command)
 
     def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
         """Return the next state while another drives, and what is offered. state None: begin."""
@@ -318,12 +306,16 @@ class LqgControl:
         state, ready = self.lqg.stand_by(state or self.lqg.initial(inputs), inputs)
         waiting = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
         command = state.command if state.joins else 0.0
-        return state, _lqg_signals(self.name, waiting) | self._offered(command, ready=ready)
+        return state, self._signals(waiting, command, ready=ready)
 
-    def _offered(self, command: float, *, ready: bool = True) -> Signals:
-        """Return the command as the velocity that the prefilter turns into it."""
+    def _signals(self, outputs: LqgOutputs, command: float, *, ready: bool = True) -> Signals:
+        """Return outputs by signal, and what is offered: the velocity that stands for a command.
+
+        Of that velocity the prefilter makes the command.
+        """
         velocity = commanded_velocity(command, self.lqg.parameters.actuator.static)
-        return {f"{self.name}_command": velocity, f"{self.name}_ready": float(ready)}
+        offered = {f"{self.name}_command": velocity, f"{self.name}_ready": float(ready)}
+        return signals_of(outputs, self.name, "valve_command") | offered
 
     def _inputs(self, signals: Signals) -> LqgInputs:
         return LqgInputs(
@@ -391,16 +383,8 @@ def _move(signals: Signals) -> Move:
     return Move(*(signals[name] for name in CYLINDER_MOVE.fields))
 
 
-def _lqg_signals(prefix: str, outputs: LqgOutputs) -> Signals:
+def signals_of(outputs: PfcOutputs | LqgOutputs, prefix: str, command: str) -> Signals:
+    """Return a law's outputs by signal: the command by its name, the terms behind the prefix."""
     terms = outputs._asdict()
-    command = terms.pop("valve_command")
-    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
-    return {"valve_command": command} | named
-
-
-def pfc_signals(prefix: str, outputs: PfcOutputs) -> Signals:
-    """Return a predictive law's outputs by signal; terms of the law have the prefix."""
-    terms = outputs._asdict()
-    command = terms.pop("velocity_command")
-    named = {f"{prefix}_{name}": float(value) for name, value in terms.items()}
-    return {"velocity_command": command} | named
+    given = terms.pop(command)
+    return {command: given} | {f"{prefix}_{name}": float(value) for name, value in terms.items()}

@@ -2,7 +2,8 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from emir_analysis.errors import InputError
@@ -48,6 +49,21 @@ def write_all(
         except InputError as error:
             failed.append(error)
     return failed
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text in UTF-8. Raises InputError, naming the file."""
+    with written(file):
+        file.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def written(output: Path) -> Iterator[None]:
+    """Turn why an output cannot be written into an InputError that names it."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{output}: {error.strerror}") from None
 
 
 def _check_apart(output: Path, inputs: set[Path]) -> None:

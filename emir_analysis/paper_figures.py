@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from emir_analysis import compare, figure_boom, figure_flow, figure_steps, paper_table
 from emir_analysis.errors import InputError
 from emir_analysis.figure_steps import StepResponses
+from emir_analysis.outputs import written
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import Machine
 from emir_plant.sheet import even_edges, joint1
@@ -34,18 +35,14 @@ def draw(only: Sequence[int], folder: Path, progress: Callable[[str], None]) -> 
         if number not in FIGURES:
             raise InputError(f"figure {number}: there are {', '.join(map(str, FIGURES))}")
     machine, files = joint1(), []
-    try:
+    with written(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: {error.strerror}") from None
     steps = figure_steps.step_responses(even_edges())
     for number in only:
         progress(f"figure {number}: {FIGURES[number]}")
         files.append(folder / f"figure_{number:02}.png")
-        try:
+        with written(files[-1]):
             _figure(number, machine, steps).savefig(files[-1], dpi=120)
-        except OSError as error:
-            raise InputError(f"{files[-1]}: {error.strerror}") from None
     return files + paper_table.write(paper_table.measure(machine, steps, progress), folder)
 
 

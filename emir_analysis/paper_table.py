@@ -14,8 +14,8 @@ from emir_analysis import (
     paper_numbers_machine,
     paper_numbers_robot,
 )
-from emir_analysis.errors import InputError
 from emir_analysis.figure_steps import StepResponses
+from emir_analysis.outputs import write_text
 from emir_analysis.paper_number import NOT_MEASURED, Number
 from emir_plant.parameters import Machine
 
@@ -103,8 +103,5 @@ def write(table: Table, folder: Path) -> list[Path]:
         "table.json": json.dumps(table.as_json(), indent=2, allow_nan=False) + "\n",
     }
     for name, text in texts.items():
-        try:
-            (folder / name).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{folder / name}: {error.strerror}") from None
+        write_text(folder / name, text)
     return [folder / name for name in texts]

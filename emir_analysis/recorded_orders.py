@@ -1,7 +1,7 @@
 """What nodes were ordered during a run, as a recording holds it, and doing the same once more."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,12 +10,13 @@ import numpy as np
 from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.info import CHANGE
+from emir_analysis.node_controls import Signals
 from emir_analysis.run_signals import full_name_of
 from emir_analysis.switching import Choosing
 from emir_control.waypoints import Waypoints
 from emir_msgs_py.topics import ORDERS
 
-START, HOLD, STOP, FOLLOW, SET = "start", "hold", "stop", "follow", "set"
+START, FOLLOW, SET = "start", "follow", "set"  # and what brings to rest: hold, stop
 
 
 class Order(NamedTuple):
@@ -101,8 +102,23 @@ class Obedience:
         self._waiting = sorted(given, key=lambda order: order.stamp)  # stable
         self.control = self._made()
 
-    def obey(self, stamp: int, state: Any, dt: float) -> Any:
-        """Do what is in force from a period's stamp, ns, on; returns the state of the control."""
+    def answers(
+        self, inputs: Iterable[tuple[int, Signals]], recorded: Mapping[int, Signals], dt: float
+    ) -> list[tuple[Signals, Signals]]:
+        """Return recorded and replayed outputs of the periods of dt, s, that were recorded.
+
+        inputs: signals with their stamps, ns, in that order. recorded: outputs by stamp.
+        """
+        state, rows = None, []
+        for stamp, signals in inputs:
+            state = self._obeyed(stamp, state, dt)
+            state, answer = self.control.step(state, signals, dt)
+            if stamp in recorded:
+                rows.append((recorded[stamp], answer))
+        return rows
+
+    def _obeyed(self, stamp: int, state: Any, dt: float) -> Any:
+        """Do what is in force from a period's stamp, ns, on; return the state of the control."""
         while self._waiting and self._waiting[0].stamp <= stamp:
             state = self._done(self._waiting.pop(0), state, dt)
         return state

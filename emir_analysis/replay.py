@@ -20,6 +20,7 @@ from emir_analysis.node_controls import (
     NodeControl,
     PfcControl,
     PfcTipControl,
+    Signals,
     Stepping,
     TrajectoryControl,
 )
@@ -88,30 +89,28 @@ def _replay_joint1(
     offered = OFFERED_COMMANDS.get(node)
     standby = offered is not None and full_name(offered, there) is not None
 
-    def law_of_node(given: Values) -> Stepping:
-        made = _control(node, given)
-        return Ready(node, made) if standby else made
+    def made(given: Values) -> Stepping:
+        return Ready(node, _control(node, given)) if standby else _control(node, given)
 
-    if offered and standby:  # one of several: it heard what was applied
-        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
-            inputs.get(stamp + CONTROL_PERIOD_NS, {}).update(applied)
+    if offered and standby:  # one of several
+        _add_applied(inputs, bag, CONTROL_PERIOD_NS)
         commands = VELOCITY_COMMAND, VALVE_COMMAND
         answers = tuple(offered if topic in commands else topic for topic in answers)
     elif node == "force_loop" and full_name(SELECTOR_TERMS, there):
-        for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
-            inputs.get(stamp, {}).update(applied)
+        _add_applied(inputs, bag, 0)
     kept = tuple(topic for topic in answers if full_name(topic, there))
     outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
-    obedient = Obedience(law_of_node, values, changed, orders(bag, f"{node}_node"))
-    state, rows, dt = None, [], CONTROL_PERIOD_NS * 1e-9
-    for stamp, signals in sorted(inputs.items()):
-        state = obedient.obey(stamp, state, dt)
-        state, answer = obedient.control.step(state, signals, dt)
-        if stamp in outputs:
-            rows.append((outputs[stamp], answer))
+    obedient = Obedience(made, values, changed, orders(bag, f"{node}_node"))
+    rows = obedient.answers(sorted(inputs.items()), outputs, CONTROL_PERIOD_NS * 1e-9)
     if not rows:
         raise InputError(f"{bag}: no control period with all topics of {node}: not in lock step?")
     return compared(answers, rows)
+
+
+def _add_applied(inputs: Mapping[int, Signals], bag: Path, later: int) -> None:
+    """Add to a node's inputs, by stamp, what was applied, as it heard that `later`, ns."""
+    for stamp, applied in by_stamp(bag, (SELECTOR_TERMS,), CONTROL_PERIOD_NS).items():
+        inputs.get(stamp + later, {}).update(applied)
 
 
 def text(fields: list[FieldComparison], changed: Mapping[str, Any]) -> str:

@@ -11,13 +11,12 @@ from emir_analysis.errors import InputError
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
-from emir_msgs_py.topics import PLANT_PERIOD_NS, TOPICS, TRUTH, VALVE_COMMAND
+from emir_msgs_py.topics import PLANT_PERIOD_NS, PLANT_TOPICS, TRUTH, VALVE_COMMAND
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 
 NODE = "plant_node"
-OUTPUTS = tuple(topic for topic in TOPICS if topic.publisher == NODE)
 START = ("initial_angle", "initial_pressure_lowering")
 FILE = "machine_file"
 
@@ -42,7 +41,7 @@ def replay_plant(
         machine = with_values(machine, {k: v for k, v in values.items() if k in known})
     except ParameterError as error:
         raise ParameterError(f"plant: {error}") from None
-    outputs = by_stamp(bag, OUTPUTS, PLANT_PERIOD_NS)
+    outputs = by_stamp(bag, PLANT_TOPICS, PLANT_PERIOD_NS)
     commands = {
         stamp: signals["valve_command"]
         for stamp, signals in by_stamp(bag, (VALVE_COMMAND,), PLANT_PERIOD_NS).items()
@@ -50,7 +49,7 @@ def replay_plant(
     check_start(bag, outputs, commands)
     start = [number(name, values[name]) for name in START]
     try:
-        return compared(OUTPUTS, _rows(Plant(machine), start, commands, outputs))
+        return compared(PLANT_TOPICS, _rows(Plant(machine), start, commands, outputs))
     except SimulationError as error:
         raise ParameterError(f"plant: {error}") from None
 

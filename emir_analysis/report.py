@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 import plotly.io
 from matplotlib.figure import Figure
 
-from emir_analysis.errors import InputError
+from emir_analysis.outputs import write_text
 
 WIDTH = 9.0  # inch, of every picture, so that their letters have one size
 
@@ -101,10 +101,7 @@ def write_html(path: Path, title: str, blocks: Sequence[Block]) -> None:
         f"<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
         f"<body><main>\n<h1>{html.escape(title)}</h1>\n{body}\n</main></body>\n</html>\n"
     )
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
+    write_text(path, page)
 
 
 def _html(block: Heading | Text | Table | Picture) -> str:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals, Topics, pfc_signals
+from emir_analysis.node_controls import Signals, Topics, signals_of
 from emir_analysis.robot_setup import RobotForceLoopParameters
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.drive_loop import DriveLoop, DriveLoopInputs
@@ -122,7 +122,7 @@ class RobotPfcControl:
             inputs = PfcInputs(*wanted, preview, signals[f"{joint}_stroke"])
             own = state[joint] if state else self.pfc.initial(inputs)
             after[joint], shown = self.pfc.step(own, inputs, dt)
-            terms = pfc_signals("pfc", shown)
+            terms = signals_of(shown, "pfc", "velocity_command")
             outputs |= {f"{joint}_{name}": value for name, value in terms.items()}
             outputs[f"{joint}_expected_force"] = signals[f"{joint}_reference_force"]
         return after, outputs

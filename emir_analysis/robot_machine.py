@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 from emir_analysis.node_controls import NodeControl, Signals
 from emir_analysis.robot_controls import pose_signals
 from emir_msgs_py.robot_topics import (
-    PRESSURES,
-    ROBOT_CYLINDER_STATES,
-    ROBOT_JOINT_STATES,
-    ROBOT_TRUTH,
     ROBOT_VALVE_COMMAND,
     TCP_DEFLECTION,
-    TCP_POSE,
     TRUE_QUANTITIES,
     of_joints,
 )
@@ -28,9 +23,6 @@ from emir_plant.robot.sensors import RobotMeasurement, measure
 
 Array = NDArray[np.float64]
 
-OUTPUTS = (
-    ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES, PRESSURES, TCP_POSE, TCP_DEFLECTION, ROBOT_TRUTH,
-)  # fmt: skip
 TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
 PERIOD = CONTROL_PERIOD_NS * 1e-9
 PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9

@@ -1,6 +1,6 @@
 """A recording of the whole robot fed to its controllers, as `replay` does for joint 1."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -66,17 +66,20 @@ def replay_robot(
     quick = _recorded(bag, [t for t in control.inputs if t.every == "plant"], period)
     outputs = by_stamp(bag, control.outputs, period)
     obedient = Obedience(made, values, changed, orders(bag, f"{node}_node"))
-    state, rows = None, []
-    held: Signals = {}
-    for stamp, signals in sorted(quick.items()):
-        held |= slow.get(stamp, {}) | signals
-        state = obedient.obey(stamp, state, period * 1e-9)
-        state, answer = obedient.control.step(state, held, period * 1e-9)
-        if stamp in outputs:
-            rows.append((outputs[stamp], answer))
+    rows = obedient.answers(_held(quick, slow), outputs, period * 1e-9)
     if not rows:
         raise InputError(f"{bag}: no period with all topics of {node}: not in lock step?")
     return compared(control.outputs, rows)
+
+
+def _held(
+    quick: Mapping[int, Signals], slow: Mapping[int, Signals]
+) -> Iterator[tuple[int, Signals]]:
+    """Yield all signals at each stamp of the quick ones, the slow ones held between theirs."""
+    held: Signals = {}
+    for stamp, signals in sorted(quick.items()):
+        held |= slow.get(stamp, {}) | signals
+        yield stamp, held
 
 
 def _recorded(bag: Path, topics: list[Topic], period: int) -> dict[int, Signals]:

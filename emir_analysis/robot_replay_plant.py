@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.node_controls import Signals
 from emir_analysis.replay_plant import check_recorded, check_start, finite, number
-from emir_analysis.robot_machine import OUTPUTS, PLANT_PERIOD, commands, sensor_signals
+from emir_analysis.robot_machine import PLANT_PERIOD, commands, sensor_signals
 from emir_analysis.robot_setup import Posture
-from emir_analysis.stamped import FieldComparison, Signals, by_stamp, compared
+from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
-from emir_msgs_py.robot_topics import ROBOT_VALVE_COMMAND
+from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS, ROBOT_VALVE_COMMAND
 from emir_msgs_py.topics import PLANT_PERIOD_NS
 from emir_plant.plant import SimulationError
 from emir_plant.robot.plant import RobotPlant
@@ -51,13 +52,13 @@ def replay_robot_plant(
     except ParameterError as error:
         raise ParameterError(f"plant: {error}") from None
     pressure = number(PRESSURE, given[PRESSURE])
-    outputs = by_stamp(bag, OUTPUTS, PLANT_PERIOD_NS)
+    outputs = by_stamp(bag, ROBOT_PLANT_TOPICS, PLANT_PERIOD_NS)
     orders = by_stamp(bag, (ROBOT_VALVE_COMMAND,), PLANT_PERIOD_NS)
     check_start(bag, outputs, orders)
     plant = RobotPlant(machine)
     try:
         state = plant.initial(posture.angles, pressure)
-        return compared(OUTPUTS, _rows(plant, state, orders, outputs))
+        return compared(ROBOT_PLANT_TOPICS, _rows(plant, state, orders, outputs))
     except SimulationError as error:
         raise ParameterError(f"plant: {error}") from None
 

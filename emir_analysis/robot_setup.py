@@ -20,8 +20,9 @@ from emir_control.internal_model import InternalModel
 from emir_control.inverse import Ranges
 from emir_control.limits import LimitParameters
 from emir_control.pfc import PfcParameters
-from emir_control.robot_trajectory import LineParameters, Linkage, RobotTrajectory, Supply
+from emir_control.robot_trajectory import LineParameters, RobotTrajectory, Supply
 from emir_control.trajectory import TrajectoryParameters
+from emir_control.waypoints import Direct, Linkage
 from emir_msgs_py.topics import CONTROL_PERIOD_NS
 from emir_plant.parameters import Machine
 from emir_plant.robot import linkage
@@ -108,18 +109,6 @@ class Cylinder:
         return float(linkage.angle(stroke, self.record))
 
 
-class Motor:
-    """The base, whose stroke is its angle."""
-
-    def stroke(self, angle: float) -> float:
-        """Return the angle."""
-        return angle
-
-    def angle(self, stroke: float) -> float:
-        """Return the angle."""
-        return stroke
-
-
 def cascade_parameters() -> CascadeParameters:
     """Return the parameters of law (11), for every joint: with one lag the TCP keeps its line."""
     return CascadeParameters(gain=GAIN, time_constant=LAG)
@@ -191,7 +180,7 @@ def trajectory(
     """
     reaches = tuple(reach(shape) for shape in robot.linkages)
     cylinders = [Cylinder(record(shape)[0]) for shape in robot.linkages]
-    linkages: tuple[Linkage, ...] = (Motor(), *cylinders)
+    linkages: tuple[Linkage, ...] = (Direct(), *cylinders)
     by_number, margin = list(zip(cylinders, reaches, strict=True)), LimitParameters().end_margin
     return RobotTrajectory(
         name=name,

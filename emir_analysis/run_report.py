@@ -11,6 +11,7 @@ from typing import Any
 from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
+from emir_analysis.outputs import write_text, written
 from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
 from emir_analysis.robot_metrics import robot_metrics
 from emir_analysis.robot_picture import write_picture
@@ -88,10 +89,7 @@ def write_json(runs: Sequence[RunAnalysis], file: Path) -> None:
         for run in runs
     ]
     content = entries[0] if len(entries) == 1 else {"runs": entries}
-    try:
-        file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    write_text(file, json.dumps(content, indent=2) + "\n")
 
 
 def write_csv(runs: Sequence[RunAnalysis], file: Path) -> None:
@@ -101,15 +99,12 @@ def write_csv(runs: Sequence[RunAnalysis], file: Path) -> None:
     """
     told = sorted({key for run in runs for key in run.about} - {"parameters"})
     figures = [f"{m.name} [{m.unit}]" for m in runs[0].metrics]
-    try:
-        with file.open("w", encoding="utf-8", newline="") as stream:
-            table = csv.writer(stream)
-            table.writerow(["bag", *told, *figures])
-            for run in runs:
-                about = [run.about.get(key, "") for key in told]
-                table.writerow([run.bag, *about, *(m.value for m in run.metrics)])
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    with written(file), file.open("w", encoding="utf-8", newline="") as stream:
+        table = csv.writer(stream)
+        table.writerow(["bag", *told, *figures])
+        for run in runs:
+            about = [run.about.get(key, "") for key in told]
+            table.writerow([run.bag, *about, *(m.value for m in run.metrics)])
 
 
 def write_report(runs: Sequence[RunAnalysis], file: Path) -> None:

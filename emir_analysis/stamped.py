@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from emir_analysis import bags, columns
 from emir_analysis.errors import InputError
+from emir_analysis.node_controls import Signals
 from emir_analysis.run_signals import full_name
 from emir_msgs_py.topics import Topic
 
 Array = NDArray[np.float64]
-Signals = dict[str, float]
 
 
 @dataclass(frozen=True)

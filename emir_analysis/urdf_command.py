@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from emir_analysis.errors import InputError
+from emir_analysis.outputs import write_text
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
@@ -30,10 +30,7 @@ def command(options: argparse.Namespace) -> str:
     from emir_plant.robot.urdf import urdf  # noqa: PLC0415
 
     text = urdf(Mechanics(robot(options.robot, options.machine)))
-    try:
-        options.file.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{options.file}: {error.strerror}") from None
+    write_text(options.file, text + "\n")
     model = pin.buildModelFromUrdf(str(options.file))
     mass = pin.computeTotalMass(model)
     return f"{options.file}: {model.njoints - 1} joints, {mass:.0f} kg, read back by Pinocchio"

@@ -214,10 +214,14 @@ def tcp_error(machine: Machine, signals: Run) -> Array:
 
     Its place is at the joint angle of the reference stroke, the boom bent as at rest there.
     """
-    plant = Plant(machine)
-    wanted = np.array([linkage.angle(h, plant.record[0]) for h in signals["reference_stroke"]])
-    turned = machine.geometry.boom_length * (signals["true_angle"][::TICKS] - wanted)
-    return np.asarray(turned + dynamic_deflection(signals)[::TICKS])
+    return turned_off(machine, signals) + dynamic_deflection(signals)[::TICKS]
+
+
+def turned_off(machine: Machine, signals: Run) -> Array:
+    """Return the part of `tcp_error` that the joint's angle makes, m."""
+    p = Plant(machine).record[0]
+    wanted = np.array([linkage.angle(h, p) for h in signals["reference_stroke"]])
+    return np.asarray(machine.geometry.boom_length * (signals["true_angle"][::TICKS] - wanted))
 
 
 def _taken(stroke: Array, wanted: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emir_analysis.compare_command import save, select
-from emir_analysis.errors import InputError
+from emir_analysis.outputs import write_text
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import (
     AIM_HARD,
@@ -158,7 +158,4 @@ SHOWN = 5.0  # largest R in the picture
 
 
 def _write(file: Path, content: dict[str, Any]) -> None:
-    try:
-        file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    write_text(file, json.dumps(content, indent=1) + "\n")

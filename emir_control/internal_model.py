@@ -66,6 +66,12 @@ class InternalModel:
             states = self.A @ states + np.outer(self.B, float(k) ** np.arange(count))
         return np.asarray(self.C @ states)
 
+    def frequency_response(self, frequencies: Array) -> NDArray[np.complex128]:
+        """Return C (z I - A)^-1 B, (k,), at frequencies, (k,) Hz; without the observer."""
+        points = np.exp(2j * np.pi * frequencies * self.period)
+        eye = np.eye(self.order)
+        return np.array([self.C @ np.linalg.solve(z * eye - self.A, self.B) for z in points])
+
     @cached_property
     def steady_state(self) -> Array:
         """The state, shape (n,), after a constant command of 1 over LONG samples from x = 0."""

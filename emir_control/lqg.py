@@ -496,7 +496,7 @@ class Lqg:
         gain = known.loaded if state.loaded else known.gain
         return state.estimate + gain @ innovation, surprise
 
-    def _feedback(self, state: LqgState, estimate: Array, now: "Now") -> float:
+    def _feedback(self, state: LqgState, estimate: Array, now: Now) -> float:
         """Return u off the plan, m/s."""
         return state.regulator.command(estimate, np.array(state.past))
 

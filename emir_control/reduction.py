@@ -96,11 +96,6 @@ def hankel(model: Linear) -> Array:
     return np.asarray(linalg.svdvals(observe.T @ reach))
 
 
-def slow_modes(model: Linear) -> int:
-    """Return how many modes are kept as they are."""
-    return int(np.count_nonzero(np.linalg.eigvals(model.A).real > -SLOW))
-
-
 def _check(order: int, slow: int, full: int) -> None:
     if not slow < order <= full:
         raise ParameterError(f"order = {order}: the model allows {slow + 1} ... {full}")

@@ -99,10 +99,10 @@ class Regulator:
 
     modes: m in q. A: (n, n), n = 2 m + 4. B: (n, l + 1), for u now and l past ones. C: (3, n):
     joint angle, rad, bending, rad, s, m. moving, at_rest: the filter of x; watching: where another
-    one drives, u being in d. feedback:
-    (2 m + 1 + l,), on w = (q, q', s, past u); w(k+1) = extended w + driven u. stage, cost:
-    matrices of the cost of a period and to go. deflection, position: (m,) of the TCP, m, per q.
-    held: (2 m + 1,) where (q, q', s) rests under p = 1 N, the joint in its place.
+    one drives, u being in d. feedback: (2 m + 1 + l,), on w = (q, q', s, past u); w(k+1) =
+    extended w + driven u. stage, cost: matrices of the cost of a period and to go. deflection,
+    position: (m,) of the TCP, m, per q. held: (2 m + 1,) where (q, q', s) rests under p = 1 N,
+    the joint in its place.
     """
 
     modes: int

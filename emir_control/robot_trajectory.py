@@ -6,7 +6,7 @@ where the joints are measured to be.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from emir_control.trajectory import (
     TrajectoryParameters,
     distance_of,
 )
-from emir_control.waypoints import Along, Axis, Waypoints, curve
+from emir_control.waypoints import Along, Axis, Linkage, Waypoints, curve
 
 Array = NDArray[np.float64]
 
@@ -59,16 +59,6 @@ class LineParameters:
     def place(self) -> Array:
         """Return the goal as x, y, z, pitch, (4,)."""
         return np.array([self.x, self.y, self.z, self.pitch])
-
-
-class Linkage(Protocol):
-    """How a piston's stroke belongs to its joint's angle."""
-
-    def stroke(self, angle: float) -> float:
-        """Return the stroke, m, at the joint's angle, rad; of the base the angle itself."""
-
-    def angle(self, stroke: float) -> float:
-        """Return the angle, rad, at the stroke, m."""
 
 
 class Supply(NamedTuple):

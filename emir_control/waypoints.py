@@ -27,14 +27,26 @@ class WaypointError(ParameterError):
     """Waypoints that cannot be followed; the message is one line."""
 
 
-class Coordinate(Protocol):
-    """What is given of a joint, its angle or its cylinder's stroke, beside the stroke."""
+class Linkage(Protocol):
+    """How a piston's stroke belongs to its joint's angle."""
 
     def stroke(self, angle: float) -> float:
-        """Return the stroke, m, that belongs to what is given."""
+        """Return the stroke, m, at the joint's angle, rad."""
 
     def angle(self, stroke: float) -> float:
-        """Return what is given, rad or m, that belongs to a stroke, m."""
+        """Return the angle, rad, at the stroke, m."""
+
+
+class Direct:
+    """No linkage: what is given is the stroke, as of a piston by itself, or of the base's motor."""
+
+    def stroke(self, angle: float) -> float:
+        """Return what is given, m; of the base rad."""
+        return angle
+
+    def angle(self, stroke: float) -> float:
+        """Return the stroke."""
+        return stroke
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,7 @@ class Axis:
     """A joint that waypoints may name: its limits in strokes, m, and m/s."""
 
     name: str
-    coordinate: Coordinate
+    linkage: Linkage
     low: float
     high: float
     fastest: float
@@ -64,8 +76,8 @@ def curve(points: Waypoints, axes: Sequence[Axis], begin: Sequence[Reference]) -
     axes: of all joints, each of which has to be named. Raises WaypointError.
     """
     order = _checked(points, axes)
-    start = [axis.coordinate.angle(now.stroke) for axis, now in zip(axes, begin, strict=True)]
-    rates = [_rate(axis.coordinate, now) for axis, now in zip(axes, begin, strict=True)]
+    start = [axis.linkage.angle(now.stroke) for axis, now in zip(axes, begin, strict=True)]
+    rates = [_rate(axis.linkage, now) for axis, now in zip(axes, begin, strict=True)]
     times, positions = points.times, points.positions[:, order]
     velocities = points.velocities[:, order] if points.velocities.size else None
     if times[0] == 0.0:
@@ -114,10 +126,10 @@ def _check_times(times: Array) -> None:
         raise WaypointError(f"takes {times[-1]:.4g} s, longer than {LONGEST:g} s")
 
 
-def _rate(coordinate: Coordinate, now: Reference) -> float:
+def _rate(linkage: Linkage, now: Reference) -> float:
     """Return the rate of what is given that belongs to a stroke's velocity."""
-    ahead = coordinate.angle(now.stroke + now.velocity * STEP)
-    return (ahead - coordinate.angle(now.stroke - now.velocity * STEP)) / (2.0 * STEP)
+    ahead = linkage.angle(now.stroke + now.velocity * STEP)
+    return (ahead - linkage.angle(now.stroke - now.velocity * STEP)) / (2.0 * STEP)
 
 
 def _in_strokes(given: PPoly, axes: Sequence[Axis], begin: Sequence[Reference]) -> CubicSpline:
@@ -125,11 +137,11 @@ def _in_strokes(given: PPoly, axes: Sequence[Axis], begin: Sequence[Reference]) 
     times = np.linspace(0.0, end, max(2, 1 + round(end / SPACING)))
     places = given(times)
     strokes = np.array(
-        [[a.coordinate.stroke(float(x)) for a, x in zip(axes, row, strict=True)] for row in places]
+        [[a.linkage.stroke(float(x)) for a, x in zip(axes, row, strict=True)] for row in places]
     )
     for axis, column in zip(axes, strokes.T, strict=True):
         if not ((axis.low <= column) & (column <= axis.high)).all():
-            low, high = axis.coordinate.angle(axis.low), axis.coordinate.angle(axis.high)
+            low, high = axis.linkage.angle(axis.low), axis.linkage.angle(axis.high)
             raise WaypointError(f"{axis.name} leaves its range, {low:.4g} ... {high:.4g}")
     first = np.array([now.velocity for now in begin])
     found = CubicSpline(times, strokes, bc_type=((1, first), (1, np.zeros(len(axes)))))

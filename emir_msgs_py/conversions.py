@@ -79,6 +79,11 @@ def stamp_ns(message: Any) -> int:
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
+def set_stamp(message: Any, stamp: int) -> None:
+    """Stamp the message's header with a time in ns."""
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+
+
 @cache
 def message_class(type_name: str) -> Any:
     """Return the rclpy class of a type such as `sensor_msgs/msg/JointState`."""
@@ -92,7 +97,7 @@ def message(topic: Topic, stamp: int, signals: Mapping[str, float]) -> Any:
     Raises KeyError when a signal of the topic is missing.
     """
     result = message_class(topic.type)()
-    result.header.stamp.sec, result.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+    set_stamp(result, stamp)
     result.header.frame_id = topic.frame
     arrays: dict[str, list[float]] = {}
     for name, field in topic.fields.items():

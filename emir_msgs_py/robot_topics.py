@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from emir_msgs_py.topics import (
+    CASCADE_TERMS,
     CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
     CYLINDER_STATES,
+    FORCE_LOOP_TERMS,
     JOINT_STATES,
     PFC_TERMS,
     TRUTH,
@@ -65,9 +67,14 @@ def _six(
     return replace(topic, every=every or topic.every, fields=fields, names=names, frame=frame)
 
 
-def _terms(name: str, publisher: str, every: Every, terms: Sequence[tuple[str, str]]) -> Topic:
-    units = {f"{joint}_{term}": _units(joint, unit) for joint in JOINTS for term, unit in terms}
-    return named_numbers(name, publisher, every, units)
+def _six_numbers(topic: Topic, *, every: Every | None = None) -> Topic:
+    """Return a topic of joint 1's named numbers for six, joint by joint; every: as for `_six`."""
+    units = {
+        f"{joint}_{name}": _units(joint, field.unit)
+        for joint in JOINTS
+        for name, field in topic.fields.items()
+    }
+    return named_numbers(topic.name, topic.publisher, every or topic.every, units, topic.quality)
 
 
 def _pose(name: str, publisher: str, prefix: str, quality: Quality) -> Topic:
@@ -109,15 +116,7 @@ ROBOT_CYLINDER_REFERENCE = _six(
     ("reference_stroke", "position", "m"), ("reference_velocity", "velocity", "m/s"),
     ("reference_force", "effort", "N"),
 )  # fmt: skip
-ROBOT_CYLINDER_PREVIEW = named_numbers(
-    CYLINDER_PREVIEW.name, CYLINDER_PREVIEW.publisher, "control",
-    {
-        f"{joint}_{name}": _units(joint, field.unit)
-        for joint in JOINTS
-        for name, field in CYLINDER_PREVIEW.fields.items()
-    },
-    "command",
-)  # fmt: skip
+ROBOT_CYLINDER_PREVIEW = _six_numbers(CYLINDER_PREVIEW)
 TCP_REFERENCE = _pose("tcp_reference", "trajectory_node", "tcp_reference", "command")
 ROBOT_VELOCITY_COMMAND = _six(
     VELOCITY_COMMAND, GROUND,
@@ -125,22 +124,13 @@ ROBOT_VELOCITY_COMMAND = _six(
     optional=("expected_force",),
 )  # fmt: skip
 ROBOT_VALVE_COMMAND = _six(VALVE_COMMAND, GROUND, ("valve_command", "position", "1"), every="plant")
-ROBOT_CASCADE_TERMS = _terms(
-    "cascade/terms", "cascade_node", "control",
-    (("feedforward", "m/s"), ("feedback", "m/s"), ("smoothed_reference", "m")),
-)  # fmt: skip
-ROBOT_PFC_TERMS = _terms(
-    PFC_TERMS.name, PFC_TERMS.publisher, "control",
-    [(name, field.unit) for name, field in PFC_TERMS.fields.items()],
-)  # fmt: skip
-ROBOT_FORCE_LOOP_TERMS = _terms(
-    "force_loop/terms", "force_loop_node", "plant",
-    (("measured_force", "N"), ("force_feedback", "m/s"), ("wanted_velocity", "m/s"),
-     ("saturated", "1")),
-)  # fmt: skip
+ROBOT_CASCADE_TERMS = _six_numbers(CASCADE_TERMS)
+ROBOT_PFC_TERMS = _six_numbers(PFC_TERMS)
+ROBOT_FORCE_LOOP_TERMS = _six_numbers(FORCE_LOOP_TERMS, every="plant")
 
 ROBOT_TOPICS: tuple[Topic, ...] = (
     ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES, PRESSURES, TCP_POSE, TCP_DEFLECTION, ROBOT_TRUTH,
     ROBOT_CYLINDER_REFERENCE, ROBOT_CYLINDER_PREVIEW, TCP_REFERENCE, ROBOT_VELOCITY_COMMAND,
     ROBOT_VALVE_COMMAND, ROBOT_CASCADE_TERMS, ROBOT_PFC_TERMS, ROBOT_FORCE_LOOP_TERMS,
 )  # fmt: skip
+ROBOT_PLANT_TOPICS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")

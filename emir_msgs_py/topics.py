@@ -248,6 +248,7 @@ TOPICS: tuple[Topic, ...] = (
     CASCADE_TERMS, PFC_TERMS, PFC_TIP_TERMS, LQG_TERMS, MPC_TERMS, FORCE_LOOP_TERMS,
     *OFFERED_COMMANDS.values(), SELECTOR_TERMS,
 )  # fmt: skip
+PLANT_TOPICS = tuple(topic for topic in TOPICS if topic.publisher == "plant_node")
 
 DIAGNOSTICS = "/diagnostics"  # diagnostic_msgs/DiagnosticArray: what nodes say of themselves
 ORDERS = "orders"  # the same type: what a node was ordered or had set while it ran

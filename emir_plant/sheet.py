@@ -8,7 +8,7 @@ only what differs from another one beside it: `based_on: joint1.yaml`.
 """
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.resources import files
@@ -106,12 +106,33 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         for g, kind in kinds.items()
         for name, about in quantities(kind).items()
     }
-    headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
     unknown = [path for path in entries if path not in known]
+    headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
+    _check_names(entries, known, headings, strict=strict)
+    stated = {path: entries[path] for path in known if path in entries}
+    values = {path: _stated(path, entry, known[path]) for path, entry in stated.items()}
+    groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
+    effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
     unread = [
         f"{path}.{key}" for path in entries if path in known for key in entries[path]
         if key not in ENTRY
     ]  # fmt: skip
+    return Sheet(
+        machine=Machine(**groups, effects=effects),
+        tolerances={path: _tolerance(e, path) for path, e in stated.items() if "tol" in e},
+        sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
+        ignored=(*unknown, *unread),
+    )
+
+
+def _check_names(
+    entries: Collection[str], known: Collection[str], headings: list[str], *, strict: bool
+) -> None:
+    """Raise ParameterError for an entry, by dotted path, that is no parameter and may not stand.
+
+    headings: what stands in the file beside groups of entries. strict: as for `load_sheet`.
+    """
+    unknown = [path for path in entries if path not in known]
     for path in unknown:
         near = get_close_matches(path, known, n=1, cutoff=SAME)
         if path.startswith(MORE_TOLD) and near and near[0] not in entries:
@@ -119,24 +140,14 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
     for path in [*wrong, *(headings if strict else [])]:
         raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
-    values: dict[str, Any] = {}
-    for path, about in known.items():
-        entry = entries.get(path)
-        if entry is None:
-            continue
-        if entry.get("unit", about.unit) != about.unit:
-            raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
-        _check_entry(path, entry)
-        values[path] = _value(entry.get("value", 1.0), path, about)
-    groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
-    effects = Effects(**{name: groups.pop(EFFECTS + name) for name in REGISTRY})
-    stated = {path: entries[path] for path in values}
-    return Sheet(
-        machine=Machine(**groups, effects=effects),
-        tolerances={path: _tolerance(e, path) for path, e in stated.items() if "tol" in e},
-        sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
-        ignored=(*unknown, *unread),
-    )
+
+
+def _stated(path: str, entry: dict[str, Any], about: Quantity) -> Any:
+    """Return the value of an entry, 1 where it has none. Raises ParameterError for another unit."""
+    if entry.get("unit", about.unit) != about.unit:
+        raise ParameterError(f"{path}: in {entry['unit']}, expected {about.unit}")
+    _check_entry(path, entry)
+    return _value(entry.get("value", 1.0), path, about)
 
 
 def _check_entry(path: str, entry: Iterable[Any]) -> None:

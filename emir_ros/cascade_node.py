@@ -7,10 +7,10 @@ from emir_analysis.robot_controls import RobotCascadeControl
 from emir_analysis.robot_setup import cascade_parameters
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_msgs_py.topics import ROBOT
+from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
-from emir_ros.shell import ControlNode
 
 LIVE = ("gain", "time_constant")
 

@@ -1,18 +1,16 @@
 """What a node says about itself on /diagnostics, where ROS's tools look for it, and in its log."""
 
 from collections import Counter
+from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from emir_msgs_py.conversions import NANOSECONDS
+from emir_msgs_py.conversions import set_stamp
 from emir_msgs_py.topics import DIAGNOSTICS
 from emir_ros import qos
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 REPEAT = 1.0  # s, after which the last word is said again: whoever came late hears it
 
@@ -54,7 +52,7 @@ class Diagnostics:
     status's values. now: ns, what a status is stamped with.
     """
 
-    def __init__(self, node: Node, now: "Callable[[], int]", *, lockstep: bool) -> None:
+    def __init__(self, node: Node, now: Callable[[], int], *, lockstep: bool) -> None:
         self._node, self._now = node, now
         self.counts: Counter[str] = Counter()
         self.figures: Callable[[], Mapping[str, str]] = dict
@@ -84,10 +82,19 @@ class Diagnostics:
             return
         level, message = self._said
         array: Any = DiagnosticArray()
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._now(), NANOSECONDS)
+        set_stamp(array, self._now())
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(level=bytes([level]), name=name, message=message)
         found = {**self.figures(), **{key: str(n) for key, n in sorted(self.counts.items())}}
         status.values = [KeyValue(key=key, value=value) for key, value in found.items()]
         array.status.append(status)
         self._publisher.publish(array)
+
+
+def pressures(signals: Mapping[str, float]) -> dict[str, str]:
+    """Return the measured pressures among the signals as texts with their unit."""
+    return {
+        f"{name} [bar]": f"{value * 1e-5:.2f}"
+        for name, value in signals.items()
+        if "pressure_l" in name and "true" not in name
+    }

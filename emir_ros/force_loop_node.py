@@ -3,15 +3,20 @@
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import ForceLoopControl, NodeControl, force_loop_signals
+from emir_analysis.node_controls import (
+    ForceLoopControl,
+    NodeControl,
+    Signals,
+    force_loop_signals,
+)
 from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT, SELECTOR_TERMS
+from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
-from emir_ros.shell import ControlNode, Signals
 
 LIVE = ("gain",)  # the prefilter has none of that name
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)

@@ -11,7 +11,7 @@ from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 
 if TYPE_CHECKING:
-    from emir_ros.shell import ControlNode
+    from emir_ros.control_shell import ControlNode
 
 
 class LiveParameters:

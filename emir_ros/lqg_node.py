@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from emir_analysis.machine_model import lqg_parameters
-from emir_analysis.node_controls import LqgControl
+from emir_analysis.node_controls import LqgControl, Signals
 from emir_control.lqg import Lqg
 from emir_plant.sheet import joint1
+from emir_ros.control_shell import ControlNode
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_tree, reject_unknown
-from emir_ros.shell import ControlNode, Signals
 
 
 class LqgNode(ControlNode):

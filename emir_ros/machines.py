@@ -7,19 +7,11 @@ from typing import Any, Protocol
 
 from rclpy.node import Node
 
+from emir_analysis.node_controls import Signals
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import GROUND, ROBOT_VALVE_COMMAND
-from emir_msgs_py.topics import (
-    BOOM_DEFLECTION,
-    CYLINDER_STATES,
-    JOINT_STATES,
-    PRESSURE_LIFTING,
-    PRESSURE_LOWERING,
-    TRUTH,
-    VALVE_COMMAND,
-    Topic,
-)
+from emir_msgs_py.topics import TRUTH, VALVE_COMMAND, Topic
 from emir_plant import core
 from emir_plant.boom_urdf import bending, boom_urdf
 from emir_plant.parameters import Machine as JointParameters
@@ -32,16 +24,7 @@ from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
 from emir_ros.node_parameters import declare, declare_robot, declare_tree
 from emir_ros.picture import Picture
-from emir_ros.shell import Signals
 
-JOINT1_OUTPUTS = (
-    JOINT_STATES,
-    CYLINDER_STATES,
-    PRESSURE_LIFTING,
-    PRESSURE_LOWERING,
-    BOOM_DEFLECTION,
-    TRUTH,
-)
 TRUTH_SIGNALS = tuple(TRUTH.fields)  # in the order of emir_plant.core.Truth; a test holds that
 
 

@@ -16,9 +16,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from emir_common.quantity import ParameterError
-from emir_plant.plant import SimulationError
-from emir_ros.shell import NodeError, Shell, starting
+from emir_ros.shell import FAILURES, Shell, starting
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -135,7 +133,7 @@ def _run(node_class: Callable[[], Shell]) -> int:
             take_the_rest(executor, node)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except (ParameterError, NodeError, SimulationError) as error:
+    except FAILURES as error:
         sys.stderr.write(f"{error}\n")
         return 1
     finally:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from emir_msgs_py.conversions import NANOSECONDS
+from emir_msgs_py.conversions import set_stamp
 from emir_msgs_py.topics import ORDERS
 from emir_ros import qos
 
 if TYPE_CHECKING:
-    from emir_ros.shell import ControlNode
+    from emir_ros.control_shell import ControlNode
 
 
 class Orders:
@@ -30,8 +30,6 @@ class Orders:
         pairs = [KeyValue(key=key, value=json.dumps(value)) for key, value in values.items()]
         name = self._node.get_fully_qualified_name()
         array: Any = DiagnosticArray()
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(
-            self._node.next_stamp, NANOSECONDS
-        )
+        set_stamp(array, self._node.next_stamp)
         array.status.append(DiagnosticStatus(name=name, message=order, values=pairs))
         self._publisher.publish(array)

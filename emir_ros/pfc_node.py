@@ -9,10 +9,10 @@ from emir_control.pfc import Pfc, PfcParameters
 from emir_control.pfc_file import STROKE
 from emir_control.scheduled_pfc import law_of
 from emir_msgs_py.topics import ROBOT
+from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, declare_tree, reject_unknown
-from emir_ros.shell import ControlNode
 
 LIVE = ("response_time", "speed_limit", "acceleration_limit")
 

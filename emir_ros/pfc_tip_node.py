@@ -7,10 +7,10 @@ from emir_control.pfc import PfcParameters
 from emir_control.pfc_file import TIP_ANGLE
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
+from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
 from emir_ros.node_parameters import declare_pfc, reject_unknown
-from emir_ros.shell import ControlNode
 
 LIVE = ("response_time", "speed_limit", "acceleration_limit")
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from emir_msgs_py.conversions import NANOSECONDS
+from emir_msgs_py.conversions import set_stamp
 from emir_ros import qos
 
 DESCRIPTION = "robot_description"
@@ -36,5 +36,5 @@ class Picture:
             return
         positions = self._positions()
         message: Any = JointState(name=list(positions), position=list(positions.values()))
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, NANOSECONDS)
+        set_stamp(message, stamp)
         self._joints.publish(message)

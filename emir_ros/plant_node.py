@@ -11,18 +11,23 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Header
 
+from emir_analysis.node_controls import Signals
 from emir_common.quantity import check_ranges, quantity
-from emir_msgs_py.robot_topics import ROBOT_TOPICS
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, RECORDED, ROBOT
+from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD_NS,
+    PLANT_PERIOD_NS,
+    PLANT_TOPICS,
+    RECORDED,
+    ROBOT,
+)
 from emir_ros import qos
-from emir_ros.diagnostics import Beat, Level
-from emir_ros.machines import JOINT1_OUTPUTS, Joint1Machine, Machine, RobotMachine
+from emir_ros.diagnostics import Beat, Level, pressures
+from emir_ros.machines import Joint1Machine, Machine, RobotMachine
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, naming, reject_unknown
-from emir_ros.shell import NodeError, Shell, Signals, pressures
+from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import Wire, clock_message, sender, stamp_ns
-
-ROBOT_OUTPUTS = tuple(topic for topic in ROBOT_TOPICS if topic.publisher == "plant_node")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +53,7 @@ class PlantNode(Shell):
     """valve_command -> sensors, truth, and in lock step /clock."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
-        super().__init__("plant_node", JOINT1_OUTPUTS, arguments, ROBOT_OUTPUTS)
+        super().__init__("plant_node", PLANT_TOPICS, arguments, ROBOT_PLANT_TOPICS)
         robot = self.model == ROBOT
         self.own = declare_tree(self, PlantNodeParameters())
         kind: Any = RobotMachine if robot else Joint1Machine

@@ -14,9 +14,9 @@ from emir_analysis.recorded_orders import SET
 from emir_analysis.switching import Choosing, Selector, Switch
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
+from emir_ros.control_shell import ControlNode
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, reject_unknown
-from emir_ros.shell import ControlNode
 
 
 class SelectorNode(ControlNode):

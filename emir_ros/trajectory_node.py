@@ -19,6 +19,7 @@ from emir_analysis.robot_setup import path_parameters, trajectory
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
+from emir_ros.control_shell import ControlNode
 from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import (
@@ -28,7 +29,6 @@ from emir_ros.node_parameters import (
     naming,
     reject_unknown,
 )
-from emir_ros.shell import ControlNode
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
 JOINT_TRAJECTORY = "joint_trajectory"

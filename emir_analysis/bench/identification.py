@@ -26,15 +26,7 @@ EVERY = 5  # samples from one to the next of a difference equation: 20 Hz
 LAGS, DEGREE = 4, 2
 TERMS = (4, 6, 8, 11, 15)  # of a difference equation, chosen on the last third of the training
 SEEN = 2.0 / 3.0
-THRESHOLDS = (
-    0.0,
-    0.001,
-    0.003,
-    0.01,
-    0.03,
-    0.1,
-    0.3,
-)  # of the sparse regression, chosen as TERMS is
+THRESHOLDS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of sparse regression, chosen as TERMS is
 DIVERGED = 1e3  # times the spread of a signal
 NOISE = {"piston_stroke": 7e-5, "pressure_lifting": 0.2e5, "pressure_lowering": 0.2e5,
          "tip_deflection_angle": 2e-5}  # fmt: skip

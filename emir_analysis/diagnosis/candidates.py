@@ -80,6 +80,12 @@ class Trial:
         """Return the trial with the other sizes of an effect at 0, no longer to be fitted."""
         return self._less([f"effects.{effect}.{s}" for s in REGISTRY[effect].sizes if s != size])
 
+    def with_each_size(self, effect: str) -> "list[Trial]":
+        """Return the trial with each size of an effect alone, if it has several."""
+        paths = [unknown.path for unknown in self.unknowns.members]
+        sizes = [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
+        return [self.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
+
     def fixed(self, path: str, value: float) -> "Trial":
         """Return the trial with a parameter at a value, SI unit, no longer to be fitted."""
         less = self._less([path])
@@ -131,7 +137,7 @@ def fit_balances(start: Trial, evidence: Evidence, floor: Array) -> Trial:
 
     def model(points: Array) -> Array:
         missing = evidence.residuals([start.unknowns.at(x) for x in points])
-        return np.asarray((missing / floor)[:, :, evidence.fitted].reshape(len(points), -1))
+        return evidence.in_noise(missing, floor)
 
     low, high = start.unknowns.bounds
     problem = Problem(model, start.x, low, high, start.unknowns.toleranced)

@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.model_file import write_model
 from emir_analysis.diagnosis.page import write_page
 from emir_analysis.diagnosis.predictions import write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
-from emir_analysis.diagnosis.search import Progress
+from emir_analysis.diagnosis.whole import Progress
 from emir_analysis.diagnosis.wiring import check_wiring
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.outputs import check_outputs, write_all

@@ -10,12 +10,13 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.search import Progress, Search, Tried
+from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.diagnosis.where import Where, where
+from emir_analysis.diagnosis.whole import Progress
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
@@ -62,7 +63,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     search = Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
-    final = search.whole(chosen) if chosen.effects else refitted
+    final = search.whole.fitted(chosen) if chosen.effects else refitted
     machines = [sheet.machine, search.balanced.machine]
     before, unaided = evidence.residuals(machines)
     after = unaided
@@ -72,7 +73,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     good = good and explained(final, evidence)
     verdict = _verdict(final, len(best) - 1, convincing=good)
     if verdict == "nothing_missing":
-        refitted = final = search.whole(final)
+        refitted = final = search.whole.fitted(final)
     with_curve, curves = None, Curves(search.balanced, evidence, search.floor)
     if verdict == "found" and not (at_noise(final, evidence) or sticks(final)):
         progress("asking whether a curve says it better")

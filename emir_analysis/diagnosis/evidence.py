@@ -91,6 +91,10 @@ class Evidence:
         left = np.concatenate([b.residuals(machines) for b in self._balances], axis=1)
         return np.asarray(np.where(self.told, left, np.nan))
 
+    def in_noise(self, residuals: Array, floor: Array) -> Array:
+        """Return those residuals, (m, w, 5), that are fitted, (m, n), in units of a floor, (5,)."""
+        return np.asarray((residuals / floor)[:, :, self.fitted].reshape(len(residuals), -1))
+
     def one_step(self, machine: Machine) -> Array:
         """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
         return np.concatenate([balances.one_step(machine) for balances in self._balances])

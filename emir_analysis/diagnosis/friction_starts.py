@@ -47,8 +47,8 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
     """
 
     def missing(points: Array) -> Array:
-        left = evidence.residuals([start.unknowns.at(x) for x in points]) / floor
-        return np.nan_to_num(left[:, :, evidence.fitted].reshape(len(points), -1))
+        left = evidence.residuals([start.unknowns.at(x) for x in points])
+        return np.nan_to_num(evidence.in_noise(left, floor))
 
     paths = [unknown.path for unknown in start.unknowns.members]
     shaping, dry, viscous = [paths.index(p) for p in SHAPES], paths.index(DRY), paths.index(VISCOUS)

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from emir_analysis.errors import InputError
+from emir_analysis.outputs import write_text
 from emir_plant.parameters import Machine
 from emir_plant.unnamed import UNNAMED
 
@@ -28,10 +28,7 @@ def write_model(file: Path, machine: Machine, recording: str) -> None:
     if not effects:
         del content["/**/plant_node"]["ros__parameters"]["effects"]
     head = f"# The machine as found by emir diagnose from {recording}. SI units.\n"
-    try:
-        file.write_text(head + yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    write_text(file, head + yaml.safe_dump(content, sort_keys=False))
 
 
 def _plain(group: Any) -> dict[str, float]:

@@ -27,7 +27,7 @@ from emir_analysis.diagnosis.statistics import (
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import untold
 from emir_analysis.diagnosis.where import Where
-from emir_analysis.errors import InputError
+from emir_analysis.outputs import write_text
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY
@@ -194,10 +194,7 @@ def write_json(path: Path, result: "DataclassInstance") -> None:
 
     Raises InputError when the file cannot be written.
     """
-    try:
-        path.write_text(json.dumps(_plain(asdict(result)), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
+    write_text(path, json.dumps(_plain(asdict(result)), indent=2) + "\n")
 
 
 def _parameters(trial: Trial) -> dict[str, ParameterResult]:

@@ -235,8 +235,7 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
 
 def _in_balances(evidence: Evidence, floor: Array) -> Missing:
     def missing(trials: list[Trial]) -> Array:
-        left = evidence.residuals([t.machine for t in trials]) / floor
-        return np.asarray(left[:, :, evidence.fitted].reshape(len(trials), -1))
+        return evidence.in_noise(evidence.residuals([t.machine for t in trials]), floor)
 
     return missing
 

@@ -1,6 +1,5 @@
 """Which effects explain the recordings: what is tried, in which order, and what is kept."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,15 +18,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.free_run import rms
-from emir_analysis.diagnosis.friction_laws import (
-    VISCOUS,
-    fullest,
-    gradual,
-    is_gradual,
-    nested,
-    sticks,
-    viscous_is_heard,
-)
+from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -42,20 +33,16 @@ from emir_analysis.diagnosis.select import (
     quiet,
     rivals,
 )
-from emir_analysis.diagnosis.stick_slip import begun, grown, with_less_friction
-from emir_common.parameter_tree import declared
-from emir_plant.effects import REGISTRY
+from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
+from emir_analysis.diagnosis.whole import LEFT, Progress, Whole
 from emir_plant.sheet import Sheet
 
-LEFT = 1.03  # the same of all signals together, from which on a further effect is looked for
 MOST_EFFECTS = 2  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 MOST_OTHERS = 2  # effects beside which is looked where nothing beside the best one suffices
 PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -88,7 +75,8 @@ class Search:
         self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
         self.refitted = fit_free_run(self.balanced, evidence)
         self.tried: list[Tried] = []
-        self._whole: dict[tuple[str, ...], Trial] = {}
+        self.whole = Whole(evidence, sheet, self.floor, progress)
+        self._rounds: dict[tuple[str, ...], list[Trial]] = {}  # the best of each, by effects
         self._settled: tuple[str, ...] = ()  # effects that are known to be needed
         self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
         self._beside_none: OnBalances | None = None
@@ -104,35 +92,52 @@ class Search:
             fit_balances(self.balanced, self._head, self.floor),
             free_run_score(self.refitted, self._evidence),
         )
-        best = plain
-        self.tried, equal, enough = [best], [best.trial], False
-        before: dict[tuple[str, ...], list[Trial]] = {(): equal}
+        self.tried = [plain]
+        best, equal, enough = self._one_at_a_time(plain)
+        if not enough:
+            equal = self._two_at_once(plain, best) or equal
+        needed = self.needed(equal[0])
+        return equal if needed is equal[0] else self._rounds.get(needed.effects, [needed])
+
+    def _one_at_a_time(self, plain: Tried) -> tuple[Tried, list[Trial], bool]:
+        """Add effects to parameters alone, one a round, as long as that is better.
+
+        Return the best trial, those that are as good and whether an effect has made it suffice.
+        """
+        best, equal, enough = plain, [plain.trial], False
+        self._rounds = {plain.trial.effects: equal}
         while len(best.trial.effects) < MOST_EFFECTS:
             self._progress(f"all effects beside: {best.trial.name}")
             better = self._beside_enough(best) if enough else self._beside(best)
             if not better:
                 break
             equal = self.simplest(_as_good(better), better)
-            before[equal[0].effects] = equal
+            self._rounds[equal[0].effects] = equal
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
                 equal, best = self._by_beginning(equal, best)
             enough = self._enough(best.trial)
             if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
                 break
-        others = [] if enough or self._evidence.complete else self._beside_others(best)
-        if others:
-            equal = others
-        elif not enough and np.any(self._evidence.fitted):
-            self._progress("pairs of effects")
-            better = self._by_balances(self._pairs(plain, best), best)
-            if better:
-                equal = _as_good(better)
-                pair = next(t for t in better if t.trial is equal[0])
-                if sticks(pair.trial):  # however far off: where it sticks drives it away
-                    equal, _ = self._by_beginning(equal, pair)
-        needed = self.needed(equal[0])
-        return equal if needed is equal[0] else before.get(needed.effects, [needed])
+        return best, equal, enough
+
+    def _two_at_once(self, plain: Tried, best: Tried) -> list[Trial]:
+        """Return the best trials beside another first effect, or else of pairs, if there are any.
+
+        plain: parameters alone. best: so far, which does not suffice.
+        """
+        others = [] if self._evidence.complete else self._beside_others(best)
+        if others or not np.any(self._evidence.fitted):
+            return others
+        self._progress("pairs of effects")
+        better = self._by_balances(self._pairs(plain, best), best)
+        if not better:
+            return []
+        equal = _as_good(better)
+        pair = next(t for t in better if t.trial is equal[0])
+        if sticks(pair.trial):  # however far off: where it sticks drives it away
+            equal, _ = self._by_beginning(equal, pair)
+        return equal
 
     def _beside_others(self, best: Tried) -> list[Trial]:
         """Return the best trials beside another effect than the best one, if they suffice.
@@ -151,7 +156,7 @@ class Search:
             self._progress(f"all effects beside: {other.trial.name}")
             better = self._beside(other)
             found = _as_good(better) if better else []
-            if found and self._enough(self.whole(found[0])):
+            if found and self._enough(self.whole.fitted(found[0])):
                 return found
         return []
 
@@ -165,93 +170,32 @@ class Search:
         for other in (t.trial for t in better):
             fewer = other.x.size < best.x.size and not sticks(other)
             if fewer and at_noise(best, self._head) and at_noise(other, self._head):
-                limit = self._on_whole(self.whole(best)) + STRONG
-                if self._on_whole(self.whole(other)) < limit:
+                limit = self.whole.score(self.whole.fitted(best)) + STRONG
+                if self.whole.score(self.whole.fitted(other)) < limit:
                     best, equal = other, [other]
         return equal
 
-    def whole(self, chosen: Trial) -> Trial:
-        """Return a trial fitted to the free run of the whole recordings."""
-        if chosen.effects not in self._whole:
-            self._progress(f"fitting to the whole recording: {chosen.name}")
-            fitted = refine_free_run(chosen, self._evidence)
-            if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
-                fitted = self._with_fewer_sizes(fitted)
-                again = self._led_again if sticks(fitted) else self._refined_again
-                fitted = again(fitted)
-            self._whole[chosen.effects] = self._with_simple_shares(fitted)
-        return self._whole[chosen.effects]
-
-    def _refined_again(self, fitted: Trial) -> Trial:
-        """Return a trial fitted again from where it ended, as long as that helps much.
-
-        Where something switches, slopes lead only a little way at a time.
-        """
-        while self._excess(fitted) > LEFT**2 - 1.0:
-            again = refine_free_run(fitted, self._evidence)
-            if self._on_whole(again) > self._on_whole(fitted) - STRONG:
-                break
-            fitted = again
-        return fitted
-
-    def _led_again(self, fitted: Trial) -> Trial:
-        """Return a trial that sticks led along a beginning that grows, if that is better.
-
-        Over all of a recording at once a fit ends close to where it began.
-        """
-        return min(fitted, grown(fitted, self._evidence), key=self._on_whole)
-
-    def _with_fewer_sizes(self, full: Trial) -> Trial:
-        """Return a trial with one size of its effects alone where that is better than with all.
-
-        Beside another that explains nothing a size may not find its way.
-        """
-        best = full
-        for effect in full.effects:
-            alone = min(_with_one_size(best, effect), key=self._on_whole, default=None)
-            if alone is not None:
-                best = min(best, refine_free_run(alone, self._evidence), key=self._on_whole)
-        return best
-
-    def _with_simple_shares(self, fitted: Trial) -> Trial:
-        """Return a trial whose shares are none or all of it where that is as good.
-
-        What the recordings do not tell, chance would decide; where both do, what is usual is taken.
-        """
-        for unknown in fitted.unknowns.members:
-            if unknown.is_share:
-                usual = round(declared(self._sheet.machine)[unknown.path][1])
-                ends = [fitted.fixed(unknown.path, float(end)) for end in (usual, 1 - usual)]
-                score = self._on_whole(fitted)
-                fitted = next((end for end in ends if self._on_whole(end) <= score), fitted)
-        return fitted
-
     def needed(self, chosen: Trial) -> Trial:
         """Return a trial without the effect that is least needed, if one is not."""
-        if not chosen.effects or not self._enough(self.whole(chosen)):
+        if not chosen.effects or not self._enough(self.whole.fitted(chosen)):
             return chosen
-        least = self._on_whole(self.whole(chosen)) + STRONG
+        least = self.whole.score(self.whole.fitted(chosen)) + STRONG
         enough = []
         for effect in chosen.effects:
             if effect in self._settled:
                 continue
-            fewer = self.whole(chosen).without(effect)
+            fewer = self.whole.fitted(chosen).without(effect)
             if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
                 continue
             self._progress(f"fitting without: {effect}")
-            fitted = refine_free_run(fewer, self._evidence)
-            known = self._whole.get(fewer.effects, fitted)
-            fitted = min(fitted, known, key=self._on_whole)
-            if self._on_whole(fitted) < least and self._enough(fitted):
+            fitted = self.whole.better(refine_free_run(fewer, self._evidence))
+            if self.whole.score(fitted) < least and self._enough(fitted):
                 enough.append(fitted)
         if not enough:
             return chosen
-        best = min(enough, key=self._on_whole)
-        self._whole[best.effects] = best
+        best = min(enough, key=self.whole.score)
+        self.whole.keep(best)
         return self.needed(best)
-
-    def _on_whole(self, fitted: Trial) -> float:
-        return free_run_score(fitted, self._evidence, seen=0.0)
 
     def _known_whole(self, best: Tried) -> Tried:
         """Return a trial as the whole recordings have it, if it is near them.
@@ -263,7 +207,7 @@ class Search:
         if sticks(best.trial) and not at_noise(best.trial, self._head):
             return best
         near = self._excess(best.trial) < HOPELESS**2
-        return replace(best, trial=self.whole(best.trial)) if near else best
+        return replace(best, trial=self.whole.fitted(best.trial)) if near else best
 
     def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
         """Return the best trials, one that sticks, with the friction that a beginning tells.
@@ -282,43 +226,14 @@ class Search:
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
         if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
             return equal, best
-        found = self._grown(law, fuller)
-        if self._on_whole(found) > self._on_whole(best.trial) - STRONG:
+        found = self.whole.with_friction(law, fuller)
+        if self.whole.score(found) > self.whole.score(best.trial) - STRONG:
             return equal, best
-        self._whole[found.effects] = found
+        self.whole.keep(found)
         self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
         told = self._scored(found, free_run_score(found, self._evidence))
         self.tried.append(told)
         return [found], told
-
-    def _grown(self, law: Trial, fuller: list[Trial]) -> Trial:
-        """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
-
-        A break-away may show in later sticks than those of the beginning, and whether friction
-        comes by tanh or gradually shows in many sticks only.
-        """
-        found = self._heard(grown(law, self._evidence))
-        off = LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2
-        if off and not is_gradual(law):
-            other = self._heard(grown(gradual(law), self._evidence))
-            if self._on_whole(other) < self._on_whole(found):
-                found, fuller = other, [gradual(more) for more in fuller]
-        for more in fuller:
-            if at_noise(found, self._evidence):
-                break
-            led = self._heard(grown(more, self._evidence))
-            if at_noise(led, self._evidence):
-                found = led
-        return found
-
-    def _heard(self, led: Trial) -> Trial:
-        """Return a trial without viscous friction that has become too small to be heard.
-
-        It may have led to where the machine sticks at the right instants, and is needed no more.
-        """
-        if VISCOUS not in led.effects or viscous_is_heard(led, self._evidence, self.floor):
-            return led
-        return refine_free_run(led.without(VISCOUS), self._evidence)
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.
@@ -375,7 +290,8 @@ class Search:
             promising = [t for t in promising if excess(t.trial, self._head) < limit]
         better = self._better(promising, best)
         close = min(map(_free, better), default=0.0) + STRONG
-        return [t for t in better if _free(t) < close and self._excess(self.whole(t.trial)) < least]
+        better = [t for t in better if _free(t) < close]
+        return [t for t in better if self._excess(self.whole.fitted(t.trial)) < least]
 
     def _on_free_run(self, best: Tried) -> list[Tried]:
         """Return the trials with one effect more that promise most on the free run.
@@ -449,7 +365,7 @@ class Search:
             return replace(tried, free_run=free_run_score(full, self._evidence))
         ways = [full]
         for effect in full.effects:
-            ways += _with_one_size(full, effect)
+            ways += full.with_each_size(effect)
         scores = [free_run_score(way, self._evidence) for way in ways]
         best_way = int(np.argmin(scores))
         return Tried(ways[best_way], tried.balances, scores[best_way])
@@ -459,7 +375,7 @@ class Search:
 
         For recordings too short for a part held back to tell: nothing may move in it.
         """
-        better = self._on_whole(tried) < self._on_whole(best) - STRONG
+        better = self.whole.score(tried) < self.whole.score(best) - STRONG
         return better and not self._enough(best) and self._enough(tried)
 
     def _enough(self, tried: Trial) -> bool:
@@ -475,13 +391,6 @@ class Search:
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
-
-
-def _with_one_size(full: Trial, effect: str) -> list[Trial]:
-    """Return a trial with each size of an effect alone, if it has several."""
-    paths = [unknown.path for unknown in full.unknowns.members]
-    sizes = [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
-    return [full.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
 
 
 def _astray(tried: Trial, evidence: Evidence) -> float:

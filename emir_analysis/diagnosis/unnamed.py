@@ -149,15 +149,10 @@ class _Balances:
         moved = map(known.unknowns.at, known.x + np.diag(steps))
         left = evidence.residuals([known.machine, *moved])
         self._rms = dict(zip(BALANCES, np.sqrt(np.mean(left[0] ** 2, axis=0)), strict=True))
-        missing = self._in_noise(left)
+        missing = evidence.in_noise(left, floor)
         self._missing = missing[0]
         self._slopes = np.nan_to_num(((missing[1:] - missing[0]) / steps[:, None]).T)
         self._independent = evidence.duration(1.0) / FORCE_WINDOW
-
-    def _in_noise(self, left: Array) -> Array:
-        """Return what is missing in each balance, (m, w, 5), as (m, n) in units of the noise."""
-        fitted = (left / self._floor)[:, :, self._evidence.fitted]
-        return np.asarray(fitted.reshape(len(left), -1))
 
     def best(self, forms: Sequence[_Form]) -> _Begun | None:
         """Return the trial with the curves that the balances prefer, if there is any."""
@@ -202,7 +197,8 @@ class _Balances:
         """Return the slopes, (n, p), of what is missing by a curve's points."""
         alone = Unknowns(machine, points)
         moved = self._evidence.residuals([alone.at(x) for x in np.eye(len(points))])
-        return np.asarray(np.nan_to_num((self._in_noise(moved) - self._missing).T))
+        missing = self._evidence.in_noise(moved, self._floor)
+        return np.asarray(np.nan_to_num((missing - self._missing).T))
 
     def _smoothest(self, form: _Form) -> _Begun:
         """Return the trial by least squares, parameters and points inside their bounds.

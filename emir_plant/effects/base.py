@@ -5,6 +5,8 @@ from typing import ClassVar, Literal
 
 Balance = Literal["force", "chambers", "valve", "supply", "logic block", "kinematics", "sensors"]
 
+SENSORS = ("angle", "pressure_lifting", "pressure_lowering", "deflection", "stroke")  # a size each
+
 
 @dataclass(frozen=True)
 class Effect:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from emir_common.quantity import quantity
-from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.base import SENSORS, Balance, Effect
 
 
 @dataclass(frozen=True)
@@ -12,13 +12,7 @@ class SensorBias(Effect):
     """Shown = true + bias, one bias for each sensor."""
 
     balance: ClassVar[Balance] = "sensors"
-    sizes: ClassVar[tuple[str, ...]] = (
-        "angle",
-        "pressure_lifting",
-        "pressure_lowering",
-        "deflection",
-        "stroke",
-    )
+    sizes: ClassVar[tuple[str, ...]] = SENSORS
     source: ClassVar[str] = (
         "zero of a 400 bar transducer 0.25 %; mounting of a resolver; zero of a bridge"
     )

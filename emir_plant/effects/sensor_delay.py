@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from emir_common.quantity import quantity
-from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.base import SENSORS, Balance, Effect
 from emir_plant.jit import compiled
 
 SHORTEST = 5e-4  # s
@@ -22,13 +22,7 @@ class SensorDelay(Effect):
     """
 
     balance: ClassVar[Balance] = "sensors"
-    sizes: ClassVar[tuple[str, ...]] = (
-        "angle",
-        "pressure_lifting",
-        "pressure_lowering",
-        "deflection",
-        "stroke",
-    )
+    sizes: ClassVar[tuple[str, ...]] = SENSORS
     source: ClassVar[str] = "filters of transducers and amplifiers, sampling and bus: 10-50 ms"
     trial: ClassVar[dict[str, float]] = {
         "angle": 0.02,

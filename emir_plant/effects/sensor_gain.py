@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from emir_common.quantity import quantity
-from emir_plant.effects.base import Balance, Effect
+from emir_plant.effects.base import SENSORS, Balance, Effect
 
 
 @dataclass(frozen=True)
@@ -12,13 +12,7 @@ class SensorGain(Effect):
     """Shown = true (1 + error), one error for each sensor."""
 
     balance: ClassVar[Balance] = "sensors"
-    sizes: ClassVar[tuple[str, ...]] = (
-        "angle",
-        "pressure_lifting",
-        "pressure_lowering",
-        "deflection",
-        "stroke",
-    )
+    sizes: ClassVar[tuple[str, ...]] = SENSORS
     source: ClassVar[str] = "span of a pressure transducer 0.5 %, of strain gauges 2 %"
     trial: ClassVar[dict[str, float]] = {
         "angle": 5e-3,

@@ -70,7 +70,7 @@ def fitted(begun: tuple[Search, Sheet, Evidence], *effects: str) -> Trial:
     """Return a trial with the effects, fitted."""
     searched, sheet, evidence = begun
     start = fit_balances(trial(sheet, effects), evidence, searched.floor)
-    return searched.whole(fit_free_run(start, evidence))
+    return searched.whole.fitted(fit_free_run(start, evidence))
 
 
 @pytest.mark.parametrize("samples", [2, 4, 10, 20])

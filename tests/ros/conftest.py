@@ -1,7 +1,20 @@
-"""Lets the tests of this folder import what they share, and the browser of the analysis' tests."""
+"""What the tests of this folder share: an rclpy that runs; and they may import helpers."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "analysis")]
+
+
+@pytest.fixture
+def ros(ros_domain: int) -> Iterator[None]:
+    """Have rclpy running; the test's module has seen to it that there is one."""
+    import rclpy
+
+    rclpy.init()
+    yield
+    rclpy.try_shutdown()

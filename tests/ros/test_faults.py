@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosbags.highlevel import AnyReader
@@ -109,12 +108,10 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    rclpy.init()
+def bench(ros: None) -> Bench:
     made = Bench()
     made.settle()
-    yield made
-    rclpy.shutdown()
+    return made
 
 
 def test_one_message_in_twenty_lost_changes_nothing(bench: Bench) -> None:

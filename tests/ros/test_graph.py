@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -108,9 +108,20 @@ def _assert_equal(bag: Path, controller: str) -> None:
         stamps = [conversions.stamp_ns(message) for _, message in messages]
         assert stamps == [k * period for k in range(round(DURATION * 1e9 / period) + 1)]
         assert stamps == [log_time for log_time, _ in messages]
+    _assert_signals(recorded, names, loop)
+
+
+def _assert_signals(
+    recorded: dict[str, list[tuple[int, object]]],
+    names: Collection[str],
+    expected: dict[str, np.ndarray],
+) -> None:
+    """Every signal of the topics, as recorded, is as expected in every bit."""
+    for topic in map(by_name, names):
+        messages = recorded[f"/{topic.name}"]
         for name in topic.fields:
             values = [conversions.values(topic, message)[name] for _, message in messages]
-            assert np.array_equal(values, loop[name]), name
+            assert np.array_equal(values, expected[name]), name
 
 
 @pytest.mark.parametrize(
@@ -162,13 +173,7 @@ def test_switching_in_lock_step_equals_the_plain_loop_and_itself(tmp_path: Path)
     recorded = _read_with_rosbags(bag)
     plan = Plan(bag=bag, controller="cascade", switches=switches[1:])
     assert recorded.keys() == {f"/{name}" for name in plan.topics}
-    for topic in map(by_name, plan.topics):
-        for name in topic.fields:
-            values = [
-                conversions.values(topic, message)[name]
-                for _, message in recorded[f"/{topic.name}"]
-            ]
-            assert np.array_equal(values, expected[name]), name
+    _assert_signals(recorded, plan.topics, expected)
     for node in ("trajectory", "cascade", "pfc", "pfc_tip", "selector", "force_loop"):
         assert same(replay(bag, node, {})), node
 
@@ -191,13 +196,7 @@ def test_switching_by_way_of_lqg_in_lock_step_equals_the_plain_loop(tmp_path: Pa
     plan = Plan(bag=bag, controller="pfc", switches=switches[1:])
     names = [name for name in plan.topics if f"/{name}" in recorded]
     assert {"lqg/velocity_command", "force_loop/terms", "selector/terms"} <= set(names)
-    for topic in map(by_name, names):
-        for name in topic.fields:
-            values = [
-                conversions.values(topic, message)[name]
-                for _, message in recorded[f"/{topic.name}"]
-            ]
-            assert np.array_equal(values, expected[name]), name
+    _assert_signals(recorded, names, expected)
     for node in ("lqg", "pfc", "force_loop"):
         assert same(replay(bag, node, {})), node
 

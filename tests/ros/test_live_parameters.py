@@ -1,14 +1,13 @@
 """Parameters set while a node runs: checked, in force from the next period, recorded."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -23,15 +22,10 @@ from emir_ros.plant_node import PlantNode
 from emir_ros.recorder_node import RecorderNode
 from emir_ros.trajectory_node import TrajectoryNode
 
+pytestmark = pytest.mark.usefixtures("ros")
+
 DT = CONTROL_PERIOD_NS * 1e-9
 SIGNALS = {"reference_stroke": 0.31, "reference_velocity": 0.0, "stroke": 0.3}
-
-
-@pytest.fixture(autouse=True)
-def ros(ros_domain: int) -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.shutdown()
 
 
 def _set(node: Node, name: str, value: float) -> str:

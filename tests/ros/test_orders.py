@@ -1,7 +1,7 @@
 """What is ordered or set during a run in lock step is recorded with its period, and replayed."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import numpy as np
-import rclpy
 from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -29,15 +28,10 @@ from emir_ros.graph import Plan, ros_arguments
 from emir_ros.main import make_executor
 from emir_ros.run import _node_class
 
+pytestmark = pytest.mark.usefixtures("ros")
+
 PERIOD = CONTROL_PERIOD_NS * 1e-9
 AT_REST = 1e-6  # m/s
-
-
-@pytest.fixture(autouse=True)
-def ros(ros_domain: int) -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.shutdown()
 
 
 class Run:

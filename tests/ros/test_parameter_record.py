@@ -1,14 +1,12 @@
 """The parameters of other nodes, also when the middleware drops an answer."""
 
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
@@ -17,12 +15,7 @@ from rclpy.task import Future
 from emir_ros import parameter_record
 from emir_ros.parameter_record import ParameterRecord
 
-
-@pytest.fixture(autouse=True)
-def ros(ros_domain: int) -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.shutdown()
+pytestmark = pytest.mark.usefixtures("ros")
 
 
 class Dropped(AsyncParameterClient):

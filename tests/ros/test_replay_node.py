@@ -1,7 +1,7 @@
 """A recording put into a live graph arrives whole, in its order, at the wanted speed."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -50,13 +49,6 @@ class Listener(Node):
 
     def _on_clock(self, message: Clock) -> None:
         self.clock.append(message.clock.sec * 1_000_000_000 + message.clock.nanosec)
-
-
-@pytest.fixture
-def ros() -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.try_shutdown()
 
 
 def _recorded() -> list[bytes]:

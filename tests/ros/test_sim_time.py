@@ -1,7 +1,7 @@
 """Nodes in real time on the /clock of a recording: its pace is theirs, and its pauses."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -19,15 +18,10 @@ from emir_msgs_py.topics import CONTROL_PERIOD_NS, VELOCITY_COMMAND
 from emir_ros.cascade_node import CascadeNode
 from emir_ros.replay_node import ReplayNode
 
+pytestmark = pytest.mark.usefixtures("ros")
+
 OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"  # 3.2 s
 END = 3_200_000_000  # ns
-
-
-@pytest.fixture(autouse=True)
-def ros(ros_domain: int) -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.shutdown()
 
 
 def _words(**parameters: Any) -> list[str]:

@@ -5,7 +5,7 @@ import math
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -14,7 +14,6 @@ pytest.importorskip("viser", reason="needs the extra `view`")
 
 pytest.importorskip("playwright", reason="needs playwright and a browser")
 
-import rclpy
 from browser import page
 from rclpy.executors import SingleThreadedExecutor
 
@@ -33,14 +32,11 @@ DEADLINE = 30.0  # s
 
 
 @pytest.fixture
-def port() -> Iterator[int]:
+def port(ros: None) -> int:
     """A port that nobody uses, and a running ROS."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        number = probe.getsockname()[1]
-    rclpy.init()
-    yield number
-    rclpy.try_shutdown()
+        return int(probe.getsockname()[1])
 
 
 def test_the_page_shows_what_is_published(port: int) -> None:

@@ -1,0 +1,131 @@
+"""Trials fitted to the free run of the whole recordings, each set of effects once."""
+
+from collections.abc import Callable
+
+from emir_analysis.diagnosis.candidates import HOPELESS, Trial, refine_free_run
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.friction_laws import (
+    VISCOUS,
+    gradual,
+    is_gradual,
+    sticks,
+    viscous_is_heard,
+)
+from emir_analysis.diagnosis.select import STRONG, at_noise, excess, free_run_score
+from emir_analysis.diagnosis.stick_slip import grown
+from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
+from emir_plant.sheet import Sheet
+
+LEFT = 1.03  # RMS error of all signals in units of the noise, from which on a fit is gone on with
+
+Progress = Callable[[str], None]
+
+
+class Whole:
+    """What has been fitted to the whole recordings. floor: (5,) of the balances."""
+
+    def __init__(self, evidence: Evidence, sheet: Sheet, floor: Array, progress: Progress) -> None:
+        self._evidence, self._sheet = evidence, sheet
+        self._floor, self._progress = floor, progress
+        self._known: dict[tuple[str, ...], Trial] = {}
+
+    def fitted(self, chosen: Trial) -> Trial:
+        """Return a trial fitted to the free run of the whole recordings."""
+        if chosen.effects not in self._known:
+            self._progress(f"fitting to the whole recording: {chosen.name}")
+            fitted = refine_free_run(chosen, self._evidence)
+            if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
+                fitted = self._with_fewer_sizes(fitted)
+                again = self._led_again if sticks(fitted) else self._refined_again
+                fitted = again(fitted)
+            self._known[chosen.effects] = self._with_simple_shares(fitted)
+        return self._known[chosen.effects]
+
+    def _refined_again(self, fitted: Trial) -> Trial:
+        """Return a trial fitted again from where it ended, as long as that helps much.
+
+        Where something switches, slopes lead only a little way at a time.
+        """
+        while self._excess(fitted) > LEFT**2 - 1.0:
+            again = refine_free_run(fitted, self._evidence)
+            if self.score(again) > self.score(fitted) - STRONG:
+                break
+            fitted = again
+        return fitted
+
+    def _led_again(self, fitted: Trial) -> Trial:
+        """Return a trial that sticks led along a beginning that grows, if that is better.
+
+        Over all of a recording at once a fit ends close to where it began.
+        """
+        return min(fitted, grown(fitted, self._evidence), key=self.score)
+
+    def _with_fewer_sizes(self, full: Trial) -> Trial:
+        """Return a trial with one size of its effects alone where that is better than with all.
+
+        Beside another that explains nothing a size may not find its way.
+        """
+        best = full
+        for effect in full.effects:
+            alone = min(best.with_each_size(effect), key=self.score, default=None)
+            if alone is not None:
+                best = min(best, refine_free_run(alone, self._evidence), key=self.score)
+        return best
+
+    def _with_simple_shares(self, fitted: Trial) -> Trial:
+        """Return a trial whose shares are none or all of it where that is as good.
+
+        What the recordings do not tell, chance would decide; where both do, what is usual is taken.
+        """
+        for unknown in fitted.unknowns.members:
+            if unknown.is_share:
+                usual = round(declared(self._sheet.machine)[unknown.path][1])
+                ends = [fitted.fixed(unknown.path, float(end)) for end in (usual, 1 - usual)]
+                score = self.score(fitted)
+                fitted = next((end for end in ends if self.score(end) <= score), fitted)
+        return fitted
+
+    def keep(self, fitted: Trial) -> None:
+        """Take a trial as the one that is fitted with its effects."""
+        self._known[fitted.effects] = fitted
+
+    def better(self, fitted: Trial) -> Trial:
+        """Return a trial, or the one known with the same effects where that is better."""
+        return min(fitted, self._known.get(fitted.effects, fitted), key=self.score)
+
+    def score(self, fitted: Trial) -> float:
+        """Return the score of the free run of the whole recordings; smaller is better."""
+        return free_run_score(fitted, self._evidence, seen=0.0)
+
+    def _excess(self, tried: Trial) -> float:
+        return excess(tried, self._evidence)
+
+    def with_friction(self, law: Trial, fuller: list[Trial]) -> Trial:
+        """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
+
+        A break-away may show in later sticks than those of the beginning, and whether friction
+        comes by tanh or gradually shows in many sticks only.
+        """
+        found = self._heard(grown(law, self._evidence))
+        off = LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2
+        if off and not is_gradual(law):
+            other = self._heard(grown(gradual(law), self._evidence))
+            if self.score(other) < self.score(found):
+                found, fuller = other, [gradual(more) for more in fuller]
+        for more in fuller:
+            if at_noise(found, self._evidence):
+                break
+            led = self._heard(grown(more, self._evidence))
+            if at_noise(led, self._evidence):
+                found = led
+        return found
+
+    def _heard(self, led: Trial) -> Trial:
+        """Return a trial without viscous friction that has become too small to be heard.
+
+        It may have led to where the machine sticks at the right instants, and is needed no more.
+        """
+        if VISCOUS not in led.effects or viscous_is_heard(led, self._evidence, self._floor):
+            return led
+        return refine_free_run(led.without(VISCOUS), self._evidence)

@@ -156,14 +156,20 @@ class LineResistance(Effect):
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
-    """Dry friction, the same at every speed."""
+    """Dry friction, the same at every speed but near standstill, where it comes gradually."""
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = OF_ORDER_ONE
-    trial: ClassVar[dict[str, float]] = {"force": 0.1}
+    trial: ClassVar[dict[str, float]] = {
+        "force": 0.1,
+        "smoothing_speed": 0.03,
+        "gradual_share": 0.5,
+    }
 
     force: float = quantity("pressure", 0.0, 10.0, "F_c over the area", default=0.0)
+    smoothing_speed: float = quantity("pressure/time", 0.01, 0.5, "v_0", default=0.03)
+    gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from emir_common.parameter_tree import declared
 from emir_plant.actuator.parameters import Actuator
+from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled_for_threads, compiled_in_place
 
 Array = NDArray[np.float64]
@@ -31,8 +32,7 @@ STATES = 8
 SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
 NOWHERE = 1e6  # a pressure that only a run out of all bounds has
 RELIEF = 5.0  # 1/time: flow of a relief valve per pressure above its setting
-SMOOTH = 0.03  # velocity below which dry friction is made smooth, in units of flow
-LAMINAR = 0.1  # relative drop below which the orifice's square root is made smooth
+LAMINAR = 0.02  # relative drop below which the orifice's square root is made smooth
 
 
 class Rates(NamedTuple):
@@ -121,7 +121,9 @@ def _friction(velocity: float, p: Any) -> float:
     resisting = p.load_viscous_friction * velocity
     resisting += p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
     if p.effects_coulomb_friction_force > 0.0:
-        resisting += p.effects_coulomb_friction_force * np.tanh(velocity / SMOOTH)
+        number = velocity / p.effects_coulomb_friction_smoothing_speed
+        share = p.effects_coulomb_friction_gradual_share
+        resisting += p.effects_coulomb_friction_force * smooth_sign(number, share)
     return resisting
 
 
@@ -151,6 +153,9 @@ def _steps(p: Any, period: float) -> int:
     fastest = 0.0
     if p.effects_elastic_boom_compliance > 0.0:
         fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    elif p.effects_coulomb_friction_force > 0.0:
+        steepest = p.effects_coulomb_friction_force / p.effects_coulomb_friction_smoothing_speed
+        fastest = p.load_frequency * p.load_frequency * steepest
     if p.effects_relief_valve_high > 0.0 or p.effects_relief_valve_low > 0.0:
         fastest += RELIEF
     fastest /= 1.0 - p.effects_load_holding_valve_line
@@ -225,6 +230,20 @@ def _loss(flow: float, coefficient: float) -> float:
 
 
 @compiled_in_place
+def _dragged(held: float, command: float, play: float) -> float:
+    """Return where a command with play drags what it holds."""
+    return min(max(held, command - play), command + play)
+
+
+@compiled_in_place
+def _oil(x: Any, measured: Any, time: float, p: Any) -> float:
+    """Return the oil's pressure behind the line, of the measured one."""
+    pressure = _at(measured, time)
+    loss = _loss(_flow(x[SPOOL], pressure, p), p.effects_line_resistance_coefficient)
+    return pressure - loss
+
+
+@compiled_in_place
 def _ahead(x: Any, step: float, slope: Any, y: Any) -> None:
     """Write x + step slope to y."""
     for i in range(STATES):
@@ -256,20 +275,17 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
         for j in range(steps):
-            time = k + (j + 0.5) / steps
-            wanted = _at(command, time - lag)
-            held = min(max(held, wanted - play), wanted + play)
-            oil = 0.0
-            if not free:
-                oil = _at(measured, time)
-                oil -= _loss(_flow(x[SPOOL], oil, p), line)
-            _slope(x, x[PRESSURE] if free else oil, held, p, a)
+            begin, middle, end = k + j / steps, k + (j + 0.5) / steps, k + (j + 1) / steps
+            first = held
+            second = _dragged(first, _at(command, middle - lag), play)
+            held = _dragged(second, _at(command, end - lag), play)
+            _slope(x, x[PRESSURE] if free else _oil(x, measured, begin, p), first, p, a)
             _ahead(x, 0.5 * h, a, y)
-            _slope(y, y[PRESSURE] if free else oil, held, p, b)
+            _slope(y, y[PRESSURE] if free else _oil(y, measured, middle, p), second, p, b)
             _ahead(x, 0.5 * h, b, y)
-            _slope(y, y[PRESSURE] if free else oil, held, p, c)
+            _slope(y, y[PRESSURE] if free else _oil(y, measured, middle, p), second, p, c)
             _ahead(x, h, c, y)
-            _slope(y, y[PRESSURE] if free else oil, held, p, d)
+            _slope(y, y[PRESSURE] if free else _oil(y, measured, end, p), held, p, d)
             for i in range(STATES):
                 x[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
         if not abs(x[PRESSURE]) < NOWHERE:

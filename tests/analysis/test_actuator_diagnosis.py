@@ -105,6 +105,42 @@ def test_an_effect_is_found_and_carries_to_the_other_recording(
     assert np.sqrt(np.mean(error**2)) == pytest.approx(signal.with_effect, rel=1e-6)
 
 
+def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
+    """Beyond a relief valve's setting alone anything changes, and the gain makes up for it."""
+
+    def relieved(spool: float, oil: float) -> float:
+        return recorded.GAIN * spool - 5.0 * (max(oil - 0.4, 0.0) - max(-oil - 0.6, 0.0))
+
+    bag, _ = recorded.record(folder, relieved)
+    sheet = load_actuator(folder / "sheet.yaml")
+    record = open_record(bag, read_signal_map(folder / "signals.yaml"))
+    plain = fit(sheet, (), record, recorded.NOISE, drawn=8)
+    known = [plain.machine]
+    found = fit(sheet, ("relief_valve",), record, recorded.NOISE, known, levels=True)
+    assert found.rms < 1.1 * recorded.NOISE < 0.2 * plain.rms
+    valve = found.machine.effects.relief_valve
+    assert (valve.high, valve.low) == pytest.approx((0.4, 0.6), rel=0.02)
+
+
+def test_a_law_that_no_effect_has_is_unexplained(folder: Path) -> None:
+    """Edges whose opening grows with its square: what comes closest is told, not named."""
+    bag, judge = recorded.record(folder, lambda spool, _: 2.0 * spool * abs(spool))
+    result = _diagnose(folder, bag, judge)
+    assert result.verdict == "unexplained", summary(result)
+    assert result.effects == ()
+    assert "comes closest" in result.statement
+
+
+def test_what_the_judge_recording_alone_shows_is_told(folder: Path) -> None:
+    bag, _ = recorded.record(folder, _proportional)
+    opening = recorded.moves(300, 3)
+    recorded.write(folder / "other", opening, recorded.pressure(opening, _limited))
+    result = _diagnose(folder, bag, folder / "other")
+    assert result.verdict == "unexplained"
+    assert f"but {folder / 'other'}, " in result.statement
+    assert "times the noise, shows more" in result.statement
+
+
 def test_a_parameter_stated_as_zero_is_fitted(folder: Path) -> None:
     stated = "viscous_friction: {value: 0.5"
     assert stated in recorded.SHEET
@@ -113,7 +149,7 @@ def test_a_parameter_stated_as_zero_is_fitted(folder: Path) -> None:
     bag, _ = recorded.record(folder, _proportional)
     sheet = load_actuator(folder / "sheet.yaml")
     record = open_record(bag, read_signal_map(folder / "signals.yaml"))
-    found = fit(sheet, (), record).machine
+    found = fit(sheet, (), record, recorded.NOISE).machine
     assert found.load.viscous_friction == pytest.approx(recorded.FRICTION, rel=0.05)
 
 
@@ -127,26 +163,33 @@ def _one_unknown(folder: Path) -> tuple[ActuatorSheet, ActuatorRecord]:
 
 def test_the_evidence_is_the_integral_over_what_is_expected(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
-    found = fit(sheet, (), record)
+    noise = recorded.NOISE
+    found = fit(sheet, (), record, noise)
+    assert found.rms > 3.0 * noise
     expected, deviation = np.log(1.0), np.log(10.0 / 0.1) / 4.0  # range 0.1 ... 10 around 1
-    independent = 4.0 * record.pressure.size / (2.0 * np.pi / 0.25)
+    samples, lasting = record.pressure.size, 2.0 * np.pi / 0.25 / 4.0
+
+    def independent(rms: float) -> float:
+        """Return Bartlett's number of independent errors: noise, and errors that last."""
+        return float(samples / (1.0 + (lasting - 1.0) * (1.0 - (noise / rms) ** 2) ** 2))
 
     def density(x: float) -> float:
         machine = with_values(sheet.machine, {"valve.gain": np.exp(x)})
         error = actuator.simulate(machine, record.opening, 1.0) - record.pressure
-        likely = -0.5 * independent * np.mean(error**2) / found.rms**2
-        return float(np.exp(likely + 0.5 * independent) * norm.pdf(x, expected, deviation))
+        likely = -0.5 * independent(found.rms) * (np.mean(error**2) / found.rms**2 - 1.0)
+        return float(np.exp(likely) * norm.pdf(x, expected, deviation))
 
     (at,) = found.x
     integral, _ = quad(density, at - 1.0, at + 1.0, points=[at - 0.1, at, at + 0.1])
-    whole = np.log(integral) - 0.5 * independent - independent * np.log(found.rms)
+    beyond, _ = quad(lambda size: independent(np.exp(size)), np.log(noise), np.log(found.rms))
+    whole = np.log(integral) - samples / lasting * np.log(noise) - beyond
     assert found.evidence == pytest.approx(whole, abs=0.05)
 
 
 def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     own = actuator.simulate(sheet.machine, record.opening, record.period)
-    found = fit(sheet, (), replace(record, pressure=own))
+    found = fit(sheet, (), replace(record, pressure=own), recorded.NOISE)
     assert found.rms == 0.0
     assert found.machine == sheet.machine
     assert np.isfinite(found.evidence)
@@ -155,8 +198,10 @@ def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None
 def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     record = replace(record, opening=0.2 * record.opening, pressure=0.2 * record.pressure)
-    without = fit(sheet, (), record)
-    found = fit(sheet, ("relief_valve",), record)  # opens at a pressure that is never reached
+    without = fit(sheet, (), record, recorded.NOISE)
+    found = fit(
+        sheet, ("relief_valve",), record, recorded.NOISE
+    )  # opens at a pressure that is never reached
     valve = found.machine.effects.relief_valve
     assert (valve.high, valve.low) == pytest.approx((3.0, 3.0))
     assert np.diag(found.covariance)[1:] == pytest.approx(4.0)
@@ -195,10 +240,11 @@ def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> No
     own = Path(actuator.__file__).parent / "data" / "crane_actuator.yaml"
     assert is_actuator(own)
     sheet = load_actuator(own)
-    plain = fit(sheet, (), record, drawn=8)
-    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, drawn=8)
+    noise = noise_of(record.pressure)
+    plain = fit(sheet, (), record, noise, drawn=8)
+    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, noise, drawn=8)
     assert limited.rms < 0.7 * plain.rms < 0.7 * np.std(record.pressure)
     both = ("flow_limit", "turbulent_resistance", "elastic_boom", "swinging_load")
-    behind = fit(sheet, both, record, [limited.machine], drawn=3)
+    behind = fit(sheet, both, record, noise, [limited.machine], drawn=3)
     assert behind.rms < 0.9 * limited.rms
     assert behind.evidence > limited.evidence > plain.evidence

@@ -25,6 +25,8 @@ from emir_plant.actuator.model import record as flat_record
 
 STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
 EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
+SHORT = 5  # evaluations, after which the best of several fits are told
+ENDED = 2  # of them, which go on to the end
 ACCURACY = 1e-5  # relative, of cost and vector
 WIDE = 20.0  # a parameter whose range spans more than this factor is fitted as its logarithm
 WIDTH = 4.0  # standard deviations in the range of a data sheet's entry
@@ -35,6 +37,7 @@ GUESSED = 0.1  # rms error before the first fit, in spreads of the pressure
 EXACT = 1e-6  # of the spread: an rms error below is none
 ROUNDS = 2  # of fits with the rms error that the one before has left
 PLACES = 60  # drawn at random; the best of them are further starts
+LEVELS = (1.0, 0.125, 0.18, 0.25, 0.35, 0.5, 0.7, 1.4, 2.0)  # of trial values: where fits start
 
 Mask = NDArray[np.bool_]
 
@@ -113,6 +116,7 @@ class _Surplus:
         sheet: ActuatorSheet,
         members: tuple[Unknown, ...],
         record: ActuatorRecord,
+        noise: float,
         seen: Mask | None,
     ) -> None:
         self.members = members
@@ -124,7 +128,9 @@ class _Surplus:
         self._part = slice(None) if seen is None else seen
         self._measured = record.pressure[self._part]
         slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
-        self.independent = INDEPENDENT * self._measured.size / slow
+        self._noise = noise
+        # how many samples a model's error takes to be another one
+        self._lasting = max(1.0, slow / INDEPENDENT)
         self._stated = flat_record(sheet.machine)
         self._places = [field(member.path) for member in members]
 
@@ -141,12 +147,36 @@ class _Surplus:
         """Return the rms error."""
         return math.sqrt(float(np.mean(self._errors(x[None]) ** 2)))
 
+    def unexpected(self, x: Array) -> float:
+        """Return minus the logarithm of how probable a place, (k,), is beforehand."""
+        return 0.5 * float(np.sum(((x - self.expected) / self.deviation) ** 2))
+
+    def independent(self, rms: float) -> float:
+        """Return how many errors count as independent.
+
+        All of the noise do, of what a model lacks one in a while; of both together those of a
+        correlation that the noise makes smaller (Bartlett 1935).
+        """
+        correlated = 1.0 - min(self._noise / rms, 1.0) ** 2
+        return self._measured.size / (1.0 + (self._lasting - 1.0) * correlated**2)
+
+    def improbable(self, rms: float) -> float:
+        """Return minus the logarithm of the errors' probability, but for a constant.
+
+        Its slope over the logarithm of the rms error is the number of independent errors.
+        """
+        few, more = self._measured.size / self._lasting, math.sqrt(self._lasting - 1.0)
+        least = max(rms, self._noise)
+        apart = more * (1.0 - (self._noise / least) ** 2)
+        slow = math.log(least) + 0.5 * more * math.atan(apart) + 0.25 * math.log1p(apart**2)
+        return few * slow + self._measured.size * math.log(rms / least)
+
     def at(self, x: Array, rms: float) -> Array:
         """Return deviations and errors; rms: the error that is expected."""
         return np.asarray(self._each_at(x[None], rms)[0])
 
     def _each_at(self, points: Array, rms: float) -> Array:
-        weight = math.sqrt(self.independent / self._measured.size) / rms
+        weight = math.sqrt(self.independent(rms) / self._measured.size) / rms
         deviations = (points - self.expected) / self.deviation
         return np.hstack([deviations, weight * self._errors(points)])
 
@@ -166,36 +196,48 @@ class _Surplus:
         cost = np.sum(self._each_at(places, rms) ** 2, axis=1)
         return [places[k] for k in np.argsort(cost, kind="stable")]
 
-    def least(self, start: Array, rms: float) -> OptimizeResult:
-        """Return the minimum that is reached from a place."""
+    def least(self, start: Array, rms: float, evaluations: int = EVALUATIONS) -> OptimizeResult:
+        """Return the minimum that is reached from a place, or how far so many evaluations lead."""
         return least_squares(
             self.at, self._inside(start), jac=self._jacobian, args=(rms,),
-            bounds=(self.low, self.high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=EVALUATIONS,
+            bounds=(self.low, self.high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=evaluations,
         )  # fmt: skip
+
+    def least_of(self, starts: Sequence[Array], rms: float) -> OptimizeResult:
+        """Return the least minimum that is reached from places: the best begun are ended."""
+        begun = [self.least(x, rms, SHORT) for x in starts]
+        begun.sort(key=lambda found: float(found.cost))
+        ended = [self.least(found.x, rms) for found in begun[:ENDED]]
+        return min(ended, key=lambda found: float(found.cost))
 
 
 def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     sheet: ActuatorSheet,
     effects: tuple[str, ...],
     record: ActuatorRecord,
+    noise: float,
     known: Sequence[Actuator] = (),
     *,
     seen: Mask | None = None,
     drawn: int = 0,
+    levels: bool = False,
 ) -> Fitted:
     """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
 
-    Starts are what is expected, each known machine (effects that it lacks at their trial values),
-    and the best `drawn` of places drawn from what is expected.
+    noise: of the pressure. Starts are each known machine, effects that it lacks at their trial
+    values, or with `levels` at all LEVELS of them; without any what is expected; and the best
+    `drawn` of places drawn from what is expected.
     """
     members = unknowns(sheet, effects)
-    surplus = _Surplus(sheet, members, record, seen)
+    surplus = _Surplus(sheet, members, record, noise, seen)
     spread = float(np.std(record.pressure))
     rms = GUESSED * spread
-    starts = [surplus.expected, *(_start(members, effects, machine) for machine in known)]
+    starts = [] if known else [surplus.expected]
+    for machine in known:
+        starts += _starts(sheet, members, machine) if levels else [_place(members, machine)]
     if drawn:
         starts += surplus.drawn(rms)[:drawn]
-    best = min((surplus.least(x, rms) for x in starts), key=lambda found: float(found.cost))
+    best = surplus.least_of(starts, rms)
     for _ in range(ROUNDS):
         rms = max(surplus.rms(best.x), EXACT * spread)
         best = surplus.least(best.x, rms)
@@ -207,9 +249,9 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
         members,
         with_values(sheet.machine, values),
         np.asarray(best.x),
-        np.linalg.inv(curvature),
+        np.linalg.pinv(curvature, hermitian=True),
         surplus.rms(best.x),
-        -float(best.cost) - surplus.independent * math.log(rms) - 0.5 * float(narrower),
+        -surplus.unexpected(best.x) - surplus.improbable(rms) - 0.5 * float(narrower),
     )
 
 
@@ -241,16 +283,29 @@ def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unk
     return Unknown(path, unit, scale, low / scale, high / scale, False, expected, TYPICAL)
 
 
-def _start(members: Sequence[Unknown], effects: Sequence[str], known: Actuator) -> Array:
+def _starts(sheet: ActuatorSheet, members: Sequence[Unknown], known: Actuator) -> list[Array]:
+    """Return places, (k,), with what a known machine lacks at all LEVELS of its trial values.
+
+    Beyond a threshold, or far from a mode, an effect changes nothing: no slope leads there. And
+    the machine may be what it is for want of the effect: also with the sheet's own parameters.
+    """
+    stated = declared(sheet.machine)
+    as_stated = with_values(known, {path: stated[path][1] for path in sheet.ranges})
+    bases = dict.fromkeys([known, as_stated])
+    return [_place(members, base, level) for base in bases for level in LEVELS]
+
+
+def _place(members: Sequence[Unknown], known: Actuator, level: float = 1.0) -> Array:
+    """Return a known machine's place, (k,), what it lacks at a level of its trial values."""
     stated = declared(known)
-    present = {e for e in effects if getattr(known.effects, e).is_on}
-    start = []
-    for member in members:
+
+    def position(member: Unknown) -> float:
         group, effect, *_ = member.path.split(".")
-        new = group == "effects" and effect not in present
-        value = _trial(member.path) if new else float(stated[member.path][1])
-        start.append(member.position(value))
-    return np.array(start)
+        if group == "effects" and not getattr(known.effects, effect).is_on:
+            return member.position(level * _trial(member.path))
+        return member.position(float(stated[member.path][1]))
+
+    return np.array([position(member) for member in members])
 
 
 def _trial(path: str) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run, one_step_error
 from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
-from emir_analysis.diagnosis.actuator.search import AT_NOISE, Search
+from emir_analysis.diagnosis.actuator.search import Search
 from emir_analysis.diagnosis.result import (
     BalanceResult,
     EffectResult,
@@ -17,13 +17,14 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
     confounded,
 )
+from emir_analysis.diagnosis.select import AT_NOISE, EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 from emir_analysis.signals import Array
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
 BALANCE = "oil"  # the only one that opening and pressure allow
-EXPLAINED = 0.7  # of the error without effects, on parts left out: half of its square
+MUCH = 0.7  # of the error without effects, on parts left out: half of its square
 BLOCK = 2.0  # slow periods in a block of the bootstrap
 INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
 LABELS = {
@@ -140,14 +141,20 @@ def diagnosis(
     noise = noise_floor(sheet, record)
     judged = record if judge is None else judge
     errors = {name: run - judged.pressure for name, run in runs.items()}
+    shown = _rms(errors["with_effect"]) / noise
+    more = judge is not None and bool(sheet.machine.sensor.pressure_noise) and shown > EXPLAINED
     ahead = one_step_errors(stages(sheet, found), record, judge)
     slow = _slow_period(found)
     chosen = found.chosen
     fitted = _parameters(chosen)
-    verdict = _verdict(found, noise)
+    verdict = _verdict(sheet, found, noise)
+    statement = _statement(verdict, found, noise)
+    if more and verdict != "unexplained":
+        verdict = "unexplained" if verdict == "nothing_missing" else verdict
+        statement += f"; but {judged.name}, {shown:.1f} times the noise, shows more"
     return ActuatorDiagnosis(
         verdict=verdict,
-        statement=_statement(verdict, found, noise),
+        statement=statement,
         effects=tuple(_effect(name, fitted) for name in chosen.effects)
         if verdict in ("found", "ambiguous")
         else (),
@@ -201,13 +208,20 @@ def _unit(unit: str, result: ActuatorDiagnosis) -> str:
     return "" if shown == "1" else shown
 
 
-def _verdict(found: Search, noise: float) -> str:
-    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
-    if plain <= AT_NOISE * noise:
+def _verdict(sheet: ActuatorSheet, found: Search, noise: float) -> str:
+    if found.unseen[found.plain.name] <= AT_NOISE * noise:
         return "nothing_missing"
-    if not found.chosen.effects or chosen > EXPLAINED * plain:
+    if not found.chosen.effects or not _explained(sheet, found, noise):
         return "unexplained"
     return "ambiguous" if found.rivals else "found"
+
+
+def _explained(sheet: ActuatorSheet, found: Search, noise: float) -> bool:
+    """Tell whether the chosen effects come to the noise, or do much where nobody has stated it."""
+    if found.chosen.rms <= AT_NOISE * noise:
+        return True
+    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
+    return not sheet.machine.sensor.pressure_noise and chosen <= MUCH * plain
 
 
 def _statement(verdict: str, found: Search, noise: float) -> str:
@@ -215,8 +229,8 @@ def _statement(verdict: str, found: Search, noise: float) -> str:
     if verdict == "nothing_missing":
         return "parameters inside their ranges bring the free run to the noise"
     left = (
-        f"{chosen:.3g} is left of {plain:.3g} on parts left out of the fit,"
-        f" {chosen / noise:.0f} times the noise"
+        f"{found.chosen.rms:.3g} is left, {found.chosen.rms / noise:.1f} times the noise, and"
+        f" {chosen:.3g} on parts left out of the fit, {plain:.3g} with parameters only"
     )
     if verdict == "unexplained":
         closest = f"{found.chosen.name} comes closest; " if found.chosen.effects else ""

@@ -11,9 +11,9 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.select import AT_NOISE
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
-AT_NOISE = 1.1  # times the noise: free-run error of a model that lacks nothing
 PARTS = 4  # of the recording, each left out once: whole movements, not pieces between their like
 MOST_EFFECTS = 8
 BREADTH = 3  # sets of effects that are followed at a time: the best first one may lead astray
@@ -51,32 +51,33 @@ def search(
     model that is down to it lacks nothing.
     """
     progress("parameters only")
-    plain = fit(sheet, (), record, drawn=DRAWN_ALONE)
+    plain = fit(sheet, (), record, noise, drawn=DRAWN_ALONE)
     tried = {_key(plain): plain}
     left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
     best = plain
-    while best.rms > AT_NOISE * noise:
-        parents = [f for f in _first(tried.values(), BREADTH) if _key(f) not in left]
+    while not (best is plain and best.rms <= AT_NOISE * noise):
+        breadth = 1 if best.rms <= AT_NOISE * noise else BREADTH
+        parents = [f for f in _first(tried.values(), breadth) if _key(f) not in left]
         if not parents:
             break
         for parent in parents:
             progress(f"beside: {parent.name}")
             left.add(_key(parent))
-            found = _neighbours(sheet, record, parent, tried)
+            found = _neighbours(sheet, record, noise, parent, tried)
             tried |= {_key(f): f for f in found}
         best = _first(tried.values(), 1)[0]
     progress("the best from each other's machines")
     good = _first(tried.values(), SETTLED)
     machines = [f.machine for f in good]
-    again = _each(good, lambda f: fit(sheet, f.effects, record, machines, drawn=DRAWN))
+    again = _each(good, lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN))
     tried |= {_key(f): f for f in again}
     ordered = _first(tried.values(), len(tried))
-    as_good = [f for f in ordered if f.evidence > ordered[0].evidence - BARE_MENTION]
+    as_good = [f for f in ordered if _probable(f) > _probable(ordered[0]) - BARE_MENTION]
     chosen = min(as_good, key=lambda f: f.x.size)
     rivals = [f for f in as_good if f is not chosen and f.x.size <= chosen.x.size]
     shown = [tried[frozenset()], chosen, *rivals]
     progress("parts left out")
-    unseen = {f.name: _unseen(sheet, f.effects, record) for f in shown}
+    unseen = {f.name: _unseen(sheet, f.effects, record, noise) for f in shown}
     return Search(tried[frozenset()], chosen, tuple(ordered), tuple(rivals), unseen)
 
 
@@ -85,13 +86,22 @@ def _key(fitted: Fitted) -> frozenset[str]:
 
 
 def _first(fits: Iterable[Fitted], count: int) -> list[Fitted]:
-    """Return those with the most evidence, the best first."""
-    return sorted(fits, key=lambda f: -f.evidence)[:count]
+    """Return the most probable ones, the best first."""
+    return sorted(fits, key=lambda f: -_probable(f))[:count]
+
+
+def _probable(fitted: Fitted) -> float:
+    """Return the logarithm of how probable a set is, but for a constant.
+
+    Before anything is measured one effect of all is expected in a machine.
+    """
+    return fitted.evidence - len(fitted.effects) * math.log(len(REGISTRY) - 1)
 
 
 def _neighbours(
     sheet: ActuatorSheet,
     record: ActuatorRecord,
+    noise: float,
     parent: Fitted,
     tried: dict[frozenset[str], Fitted],
 ) -> list[Fitted]:
@@ -99,18 +109,29 @@ def _neighbours(
     sets = [_key(parent) ^ {name} for name in REGISTRY]
     new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
-    first = _each(ordered, lambda effects: fit(sheet, effects, record, [parent.machine]))
+    first = _each(
+        ordered,
+        lambda effects: fit(sheet, effects, record, noise, [parent.machine], levels=True),
+    )
     first = _first(first, len(first))
     better, others = first[: len(first) // 2], first[len(first) // 2 :]
-    again = _each(better, lambda f: fit(sheet, f.effects, record, [f.machine], drawn=DRAWN))
+    again = _each(better, lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=DRAWN))
     return [*again, *others]
 
 
-def _unseen(sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord) -> float:
+def _unseen(
+    sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord, noise: float
+) -> float:
     """Return the RMS error of all parts, each by a fit that knows nothing of it."""
     number = np.arange(record.pressure.size) * PARTS // record.pressure.size
     parts = [number == part for part in range(PARTS)]
-    fits = _each(parts, lambda part: fit(sheet, effects, record, seen=~part, drawn=DRAWN_ALONE))
+    fits = _each(
+        parts,
+        lambda part: fit(
+            sheet, effects, record, noise, [sheet.machine],
+            seen=~part, drawn=DRAWN_ALONE, levels=True,
+        ),
+    )  # fmt: skip
     error = np.zeros(record.pressure.size)
     for part, fitted in zip(parts, fits, strict=True):
         error[part] = free_run_error(fitted.machine, record)[part]

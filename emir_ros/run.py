@@ -64,8 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         not_used = unused(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
-    if not_used:
-        sys.stderr.write(f"emir run: {plan.params}: not used, the run sets it: {not_used}\n")
+    for line in not_used:
+        sys.stderr.write(f"emir run: {plan.params}: {line}\n")
     code = run_plan(plan, options.processes)
     if plan.bag.is_dir():  # what there is, however it ended
         shown = _show(plan.bag)
@@ -75,13 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _trajectory(plan: Plan) -> str:
     """Return the trajectory that the parameter file names, if it names one."""
-    own = read_parameters(plan.params).get("trajectory_node", {})
+    own = read_parameters(plan).get("trajectory_node", {})
     return str(own.get("trajectory", plan.trajectory))
 
 
 def _duration(plan: Plan) -> float | None:
     """Return for how long the parameter file lets the machine run, s; None: it does not say."""
-    given = read_parameters(plan.params).get("plant_node", {})
+    given = read_parameters(plan).get("plant_node", {})
     wanted = {name: value for name, value in given.items() if name == "duration"}
     try:
         return with_values(PlantNodeParameters(), wanted).duration or None

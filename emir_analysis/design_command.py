@@ -66,7 +66,7 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
         else:
             parameters = design_pfc(machine, task)
     except SimulationError as error:
-        raise InputError(str(error)) from None
+        raise InputError(f"{options.machine}: {error}") from None
     pfc_file.save(options.out, parameters, output, _made_by(options, task))
     progress("stability over posture and payload")
     found = stability_map(machine, options.controller, parameters)

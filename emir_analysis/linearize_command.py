@@ -61,7 +61,7 @@ def _models(machine: Machine, point: Point, options: argparse.Namespace) -> Desi
     try:
         return design_models(Plant(machine), point, options.outputs, options.order, options.step)
     except SimulationError as error:
-        raise InputError(str(error)) from None
+        raise InputError(f"{options.machine}: {error}") from None
 
 
 def _parser() -> argparse.ArgumentParser:

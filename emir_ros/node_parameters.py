@@ -20,6 +20,7 @@ from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import TOPICS
+from emir_plant.plant import SimulationError
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.sheet import robot
 from emir_ros import qos
@@ -93,11 +94,14 @@ def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParam
 
 @contextmanager
 def naming(node: Node) -> Iterator[None]:
-    """Put the node's name in front of what is wrong with its parameters, if it is not there."""
+    """Put the node's name in front of what is wrong with its parameters, if it is not there.
+
+    A machine that cannot be as they say (SimulationError) is a ParameterError, too.
+    """
     name = f"{node.get_name()}: "
     try:
         yield
-    except ParameterError as error:
+    except (ParameterError, SimulationError) as error:
         raise ParameterError(name + str(error).removeprefix(name)) from None
 
 

@@ -242,6 +242,8 @@ class Shell(LifecycleNode):
             self._fail(error)
 
     def _fail(self, error: Failure) -> None:
+        if isinstance(error, SimulationError):  # which knows of no nodes
+            error = NodeError(f"{self.get_name()}: {error}")
         self.failure = self.failure or error
         self.end()
 

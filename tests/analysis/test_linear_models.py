@@ -120,7 +120,7 @@ def test_command_writes_models_that_python_control_reads_back(
         (["--command", "0.05"], "y2 = 0.05: in the valve's dead zone nothing moves"),
         (["--velocity", "500"], "no steady motion of 500 mm/s at 45 deg with 0 kg"),
         (["--angle", "-60"], "boom angle -60.0 deg: outside the linkage's reach"),
-        (["--payload", "1500", "--angle", "5"], "the boom needs"),
+        (["--payload", "1500", "--angle", "5"], "linearize: joint1: at 5.0 deg the boom needs"),
         (["--outputs", "colour"], "output 'colour': there are angle, tip_angle, stroke"),
         (["--order", "1"], "order = 1: the model allows 2 ... 15"),
         (["--from", "none.yaml"], "none.yaml: No such file or directory"),

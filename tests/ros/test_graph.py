@@ -535,7 +535,7 @@ BAD = {
     "angle": (
         [],
         "plant_node: {ros__parameters: {initial_angle: 0.0, supply: {p0: 5.0e6}}}",
-        "the boom needs",
+        "params.yaml: plant_node: at 0.0 deg the boom needs",
     ),
 }
 

@@ -195,6 +195,11 @@ BAD = {
         "plant_node: {ros__parameters: {effects: {command_delay: {delay: 0.01}}}}",
         "effects.command_delay: not in the model of the whole robot",
     ),
+    "too heavy": (
+        ["--trajectory", "hold"],
+        "plant_node: {ros__parameters: {supply.p0: 5.0e+6}}",
+        r"params.yaml: plant_node: joint \d needs \d+ bar to rest on, the pump gives 50",
+    ),
     "file": (
         [],
         "plant_node: {ros__parameters: {robot_file: nowhere.yaml}}",

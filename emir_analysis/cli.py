@@ -246,8 +246,8 @@ def _compare(words: list[str]) -> int:
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
-    print(command(parser.parse_args(words), _progress))
-    return 0
+    options = parser.parse_args(words)
+    return _said(str, lambda: command(options, _progress))
 
 
 def _limit(words: list[str]) -> int:

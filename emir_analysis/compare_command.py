@@ -13,7 +13,7 @@ from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.node_controls import Stepping
-from emir_analysis.outputs import check_outputs
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import cautions
@@ -32,6 +32,7 @@ def command(options: Namespace, progress: Progress) -> str:
     do some of the cases.
     """
     check_outputs([options.picture, options.csv], None, [options.pfc, options.pfc_tip])
+    check_picture(options.picture)
     if options.csv and (options.damping or options.trade_off):
         raise InputError(NO_CSV)
     if options.damping:

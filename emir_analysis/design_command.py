@@ -23,6 +23,7 @@ from emir_analysis.design_pfc import (
 )
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, from_recording
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -37,7 +38,10 @@ COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 def command(options: Namespace, progress: Callable[[str], None]) -> str:
     """Design, check, write the file; return what to tell. Raises InputError, ParameterError."""
-    recorded = _is_recording(Path(options.machine))
+    source = Path(options.machine)
+    check_outputs([options.out, options.picture], None, [source])
+    check_picture(options.picture)
+    recorded = _is_recording(source)
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
             raise InputError(f"--controller {options.controller}: a machine's YAML is needed")

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
@@ -29,6 +30,7 @@ def command(options: argparse.Namespace) -> str:
     from emir_plant.robot.dynamics import Mechanics  # noqa: PLC0415 (needs Pinocchio)
     from emir_plant.robot.urdf import urdf  # noqa: PLC0415
 
+    check_outputs([options.file], None, [options.robot, options.machine])
     text = urdf(Mechanics(robot(options.robot, options.machine)))
     try:
         options.file.write_text(text + "\n", encoding="utf-8")

@@ -28,6 +28,7 @@ from emir_analysis.bench.reading import reading_figures
 from emir_analysis.bench.timing import Figure, text, write_json
 from emir_analysis.columns import Columns
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
@@ -52,6 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Measure what the arguments say; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
+        check_outputs([options.json], None, [])
         found = {}
         for title, figures in _parts(options):
             print(text(title, figures), flush=True)  # noqa: T201 (a command prints)

@@ -33,6 +33,10 @@ from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
 RECORDED_ORDER = 4  # an ordinary run tells no more than the integrator and the slow mode
+OF_PFC = {
+    "order": None, "angle": 45.0, "payload": 0.0, "observer": 0.0, "schedule": False,
+    "coincidence": None, "response_time": None, "picture": None,
+}  # fmt: skip
 COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 
@@ -45,14 +49,17 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
             raise InputError(f"--controller {options.controller}: a machine's YAML is needed")
+        _check_nothing_else(options)
         return design_lqg.command(_machine(options.machine), options, progress)
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
         raise ParameterError(f"controller {options.controller!r}: there are {known}")
+    if not 0.0 <= options.observer < math.inf:
+        raise ParameterError(f"observer = {options.observer:g} m/s: has to be 0 or more")
     output = OUTPUTS[options.controller]
     task = DesignTask(
         controller=options.controller,
-        order=options.order or (RECORDED_ORDER if recorded else ORDERS[output]),
+        order=_order(options.order, RECORDED_ORDER if recorded else ORDERS[output]),
         point=OperatingPoint(angle=math.radians(options.angle), payload=options.payload),
         observer=options.observer,
         tuning=_tuning(options),
@@ -85,6 +92,18 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
         f"{found_model}"
         f"largest |z| of the closed loop's poles (- : no such motion):\n{as_text(found)}"
     )
+
+
+def _check_nothing_else(options: Namespace) -> None:
+    """Raise InputError for an option that a design of lqg or mpc has no use for."""
+    given = {name for name, usual in OF_PFC.items() if getattr(options, name) != usual}
+    if given:
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(given))
+        raise InputError(f"{names}: of pfc and pfc_tip, not of {options.controller}")
+
+
+def _order(given: int | None, usual: int) -> int:
+    return usual if given is None else given
 
 
 def _is_recording(path: Path) -> bool:

@@ -118,6 +118,11 @@ def test_command_writes_models_that_python_control_reads_back(
     [
         (["--velocity", "0"], "the machine has to move"),
         (["--command", "0.05"], "y2 = 0.05: in the valve's dead zone nothing moves"),
+        (["--command", "5"], "command = 5: outside -1 ... 1"),
+        (["--command", "nan"], "command = nan: outside -1 ... 1"),
+        (["--step", "0"], "step = 0: outside -1 ... 1, or none"),
+        (["--step", "nan"], "step = nan: outside"),
+        (["--step", "100"], "step = 100: outside"),
         (["--velocity", "500"], "no steady motion of 500 mm/s at 45 deg with 0 kg"),
         (["--angle", "-60"], "boom angle -60.0 deg: outside the linkage's reach"),
         (["--payload", "1500", "--angle", "5"], "linearize: joint1: at 5.0 deg the boom needs"),

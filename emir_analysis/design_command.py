@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from emir_analysis import design_lqg
+from emir_analysis.compare_command import save
 from emir_analysis.design_pfc import (
     ANGLES,
     ORDERS,
@@ -82,10 +83,7 @@ def command(options: Namespace, progress: Callable[[str], None]) -> str:
     progress("stability over posture and payload")
     found = stability_map(machine, options.controller, parameters)
     if options.picture:
-        try:
-            picture(found).savefig(options.picture, dpi=120)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{options.picture}: {error}") from None
+        save(picture(found), options.picture)
     stable = "stable everywhere" if found.worst < 1.0 else "NOT stable everywhere (!)"
     return (
         f"{options.out}: {options.controller} of order {parameters.model.order}; {stable}\n"

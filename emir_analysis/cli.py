@@ -161,6 +161,7 @@ def _replay(words: list[str]) -> int:
     from emir_analysis.recorded_orders import orders
     from emir_analysis.replay import NODES, replay, text
     from emir_analysis.stamped import same
+    from emir_common.yaml_file import read_value
 
     parser = argparse.ArgumentParser(prog="emir replay")
     parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
@@ -176,7 +177,7 @@ def _replay(words: list[str]) -> int:
         if not equals:
             raise InputError(f"--set {entry}: not of the form PARAM=VALUE")
         try:
-            changed[name] = yaml.safe_load(value)
+            changed[name] = read_value(value)
         except yaml.YAMLError:
             raise InputError(f"--set {entry}: {value} is not a value") from None
     fields = replay(options.bag, options.node, changed)

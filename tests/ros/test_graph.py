@@ -470,6 +470,12 @@ BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
     "namespace": (["--namespace", "2nd"], "", "namespace '2nd': letters, digits"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
+    "no trajectory": (["--trajectory", ""], "", "trajectory '': there are lift-lower"),
+    "trajectory's speed": (
+        [],
+        "trajectory_node: {ros__parameters: {speed: 2e+2}}",
+        "trajectory_node: speed = 200: outside",
+    ),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
     "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),

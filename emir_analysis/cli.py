@@ -190,7 +190,7 @@ def _replay(words: list[str]) -> int:
 def _view(words: list[str]) -> int:
     from emir_analysis.view.command import command
 
-    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
+    return command(words, lambda arguments: _hand_over("emir_ros.start", ["view_node", *arguments]))
 
 
 def _analyze(words: list[str]) -> int:
@@ -308,7 +308,7 @@ def _design(words: list[str]) -> int:
 
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
-        return _hand_over("emir_ros.bench", words[1:])
+        return _hand_over("emir_ros.start", ["bench", *words[1:]])
     if words[:1] == ["diagnosis"]:
         from emir_analysis.bench import identification
 

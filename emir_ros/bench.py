@@ -37,6 +37,7 @@ from emir_ros.graph import Plan
 from emir_ros.main import keep_out_of_garbage_collection, make_executor
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
+from emir_ros.start import INTERRUPTED
 from emir_ros.wire import Wire, stamp_ns
 
 Array = NDArray[np.float64]
@@ -123,7 +124,10 @@ def _lockstep(folder: Path, processes: str, simulated: float) -> Part:
 
 
 def _run(plan: Plan, processes: str) -> None:
-    if run_plan(plan, processes) != 0:
+    code = run_plan(plan, processes)
+    if code == INTERRUPTED:
+        raise KeyboardInterrupt
+    if code != 0:
         raise NodeError("the graph did not run to its end")
 
 

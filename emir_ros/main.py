@@ -15,6 +15,7 @@ from rclpy.clock_type import ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
 from emir_common.quantity import ParameterError
 from emir_plant.plant import SimulationError
@@ -120,11 +121,21 @@ def run(node_class: Callable[[], Shell]) -> None:
     sys.exit(_run(node_class))
 
 
+def _check_words(words: list[str]) -> None:
+    """Raise NodeError for words that no node knows: parameters without --ros-args among them."""
+    if words:
+        raise NodeError(
+            f"cannot start: {' '.join(words)}: not known; parameters are given by"
+            " --ros-args -p NAME:=VALUE"
+        )
+
+
 def _run(node_class: Callable[[], Shell]) -> int:
     node: Shell | None = None
     try:
         with starting():
             stop = start_ros()
+            _check_words(remove_ros_args(sys.argv)[1:])
             node = node_class()
         with make_executor() as executor:
             executor.add_node(node)

@@ -166,6 +166,8 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # nobody looks at `stop` any more
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _node_class(name: str) -> Callable[[list[str]], Shell]:

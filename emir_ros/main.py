@@ -48,9 +48,13 @@ class StopRequest:
 
 
 def start_ros() -> StopRequest:
-    """Initialize rclpy; returns what SIGINT and SIGTERM set from now on."""
+    """Initialize rclpy; returns what SIGINT and SIGTERM set from now on.
+
+    Before that: an exception out of it would leave a context that nobody shuts down.
+    """
+    stop = StopRequest()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    return StopRequest()
+    return stop
 
 
 @contextmanager

@@ -168,6 +168,8 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
         rclpy.try_shutdown()
         signal.signal(signal.SIGINT, signal.default_int_handler)  # nobody looks at `stop` any more
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if stop.made:  # while it ended by itself: whoever called has more to do
+        raise KeyboardInterrupt
 
 
 def _node_class(name: str) -> Callable[[list[str]], Shell]:

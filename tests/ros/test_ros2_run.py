@@ -145,17 +145,20 @@ def test_the_graph_told_to_stop_while_it_loads(name: str, who: str, tmp_path: Pa
     assert (finished.returncode, finished.stderr) == (130, f"{who}: interrupted\n")
 
 
-def test_told_to_stop_between_two_runs_a_measurement_ends(tmp_path: Path) -> None:
-    """The first run, in this process, has heard of signals in its own way."""
+@pytest.mark.parametrize("when", ["after", "at the end of"])
+def test_a_measurement_is_stopped_also_between_its_runs(when: str, tmp_path: Path) -> None:
+    """The first run, in this process, hears of signals in its own way, to its end."""
+    raising = "lambda *_: signal.raise_signal(signal.SIGINT)"
     script = (
-        "import signal, sys; from pathlib import Path; from emir_ros import bench, start;"
-        "bench._parts = lambda _: iter(["
-        "(bench._run(bench.Plan(bag=Path(sys.argv.pop()), duration=0.1), 'one'),"
-        " signal.raise_signal(signal.SIGINT))]);"
+        "import signal, sys; from pathlib import Path; from emir_ros import bench, run, start\n"
+        f"if sys.argv[1] == 'after': then = {raising}\n"
+        f"else: run.take_the_rest = {raising}; then = lambda: print('went on')\n"
+        "plan = bench.Plan(bag=Path(sys.argv[2]), duration=0.1)\n"
+        "bench._parts = lambda _: iter([(bench._run(plan, 'one'), then())])\n"
         "sys.argv[1:] = ['bench']; start.main()"
     )
     finished = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "bag")],
+        [sys.executable, "-c", script, when, str(tmp_path / "bag")],
         capture_output=True,
         text=True,
         timeout=DEADLINE,
@@ -164,6 +167,7 @@ def test_told_to_stop_between_two_runs_a_measurement_ends(tmp_path: Path) -> Non
     assert finished.returncode == 130, finished.stderr
     assert finished.stderr.splitlines()[-1] == "emir bench graph: interrupted"
     assert "Traceback" not in finished.stderr
+    assert finished.stdout == ""
 
 
 @pytest.mark.parametrize("words", [["-p", "gain:=1.0"], ["--help"], ["gain:=1.0", "--ros-args"]])

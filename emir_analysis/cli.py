@@ -161,6 +161,7 @@ def _replay(words: list[str]) -> int:
     from emir_analysis.recorded_orders import orders
     from emir_analysis.replay import NODES, replay, text
     from emir_analysis.stamped import same
+    from emir_common.yaml_file import read_value
 
     parser = argparse.ArgumentParser(prog="emir replay")
     parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
@@ -176,7 +177,7 @@ def _replay(words: list[str]) -> int:
         if not equals:
             raise InputError(f"--set {entry}: not of the form PARAM=VALUE")
         try:
-            changed[name] = yaml.safe_load(value)
+            changed[name] = read_value(value)
         except yaml.YAMLError:
             raise InputError(f"--set {entry}: {value} is not a value") from None
     fields = replay(options.bag, options.node, changed)
@@ -189,7 +190,7 @@ def _replay(words: list[str]) -> int:
 def _view(words: list[str]) -> int:
     from emir_analysis.view.command import command
 
-    return command(words, lambda arguments: _hand_over("emir_ros.view_node", arguments))
+    return command(words, lambda arguments: _hand_over("emir_ros.start", ["view_node", *arguments]))
 
 
 def _analyze(words: list[str]) -> int:
@@ -246,8 +247,8 @@ def _compare(words: list[str]) -> int:
     parser.add_argument(
         "--damping", action="store_true", help="instead: force feedback and capillary line"
     )
-    print(command(parser.parse_args(words), _progress))
-    return 0
+    options = parser.parse_args(words)
+    return _said(str, lambda: command(options, _progress))
 
 
 def _limit(words: list[str]) -> int:
@@ -280,7 +281,7 @@ def _design(words: list[str]) -> int:
 
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
-        return _hand_over("emir_ros.bench", words[1:])
+        return _hand_over("emir_ros.start", ["bench", *words[1:]])
     if words[:1] == ["diagnosis"]:
         from emir_analysis.bench import identification
 

@@ -14,13 +14,14 @@ from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipContro
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
+from emir_control.limits import LimitParameters
 from emir_control.pfc import PREVIEW, Future
 from emir_control.pfc_file import SCHEDULED, STROKE, TIP_ANGLE
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant
+from emir_plant.plant import Plant, SimulationError
 
 Array = NDArray[np.float64]
 Run = dict[str, Array]
@@ -91,9 +92,27 @@ def repeated(
 
 
 def run(machine: Machine, trajectory: AwayAndBack, outer: Stepping, angle: float) -> Run:
-    """Return the signals of a closed loop from rest at a boom angle, rad."""
-    loop = ClosedLoop(Plant(machine), trajectory, outer)
+    """Return the signals of a closed loop from rest at a boom angle, rad.
+
+    Raises SimulationError where the machine cannot stand or the controllers would not go.
+    """
+    plant = Plant(machine)
+    _check_way(plant, trajectory, angle)
+    loop = ClosedLoop(plant, trajectory, outer)
     return loop.run(angle, REST_PRESSURE, trajectory.duration)
+
+
+def _check_way(plant: Plant, trajectory: AwayAndBack, angle: float) -> None:
+    """Raise SimulationError for a move into the ends of the stroke, where all would stand still."""
+    start = plant.outputs(plant.initial(angle, REST_PRESSURE)).stroke
+    end = start + trajectory.parameters.distance
+    limits = LimitParameters()
+    low, high = limits.stroke_low + limits.end_margin, limits.stroke_high - limits.end_margin
+    if min(start, end) < low or max(start, end) > high:
+        raise SimulationError(
+            f"from {math.degrees(angle):.1f} deg the move takes the stroke from {start:.3f} to"
+            f" {end:.3f} m, the controllers keep it within {low:g} ... {high:g}"
+        )
 
 
 def dynamic_deflection(signals: Run) -> Array:

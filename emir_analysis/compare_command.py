@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from emir_analysis import compare_grid, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
-from emir_analysis.errors import InputError
+from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.node_controls import Stepping
-from emir_analysis.outputs import check_outputs
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import cautions
@@ -26,8 +26,13 @@ Progress = Callable[[str], None]
 
 
 def command(options: Namespace, progress: Progress) -> str:
-    """Run, draw, return the tables. Raises InputError or ParameterError."""
+    """Run, draw, return the tables.
+
+    Raises InputError or ParameterError; IncompleteError, with the tables, where the machine cannot
+    do some of the cases.
+    """
     check_outputs([options.picture, options.csv], None, [options.pfc, options.pfc_tip])
+    check_picture(options.picture)
     if options.csv and (options.damping or options.trade_off):
         raise InputError(NO_CSV)
     if options.damping:
@@ -70,7 +75,10 @@ def _cases(options: Namespace) -> list[Case]:
     instead = NOMINAL if any(given.values()) else WHOLE
     if options.repeat < 1:
         raise ParameterError(f"repeat = {options.repeat}: at least 1")
-    return grid({name: given[name] or instead[name] for name in NOMINAL})
+    cases = grid({name: given[name] or instead[name] for name in NOMINAL})
+    for case in cases:
+        case.machine(joint1())  # what is out of range is told before any work
+    return cases
 
 
 def _grid(
@@ -78,14 +86,18 @@ def _grid(
 ) -> str:
     if options.repeat > 1:
         raise InputError("--repeat is for one case: a grid varies enough")
-    found = compare_grid.results(joint1(), chosen, cases, progress)
+    found, left_out = compare_grid.results(joint1(), chosen, cases, progress)
     if options.picture:
         save(compare_grid.picture(found), options.picture)
     if options.csv:
         compare_grid.write_csv(found, options.csv)
     count = len({result.case for result in found})
     table, claims = compare_grid.as_text(found), compare_grid.order_of_merit(found)
-    return f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
+    text = f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
+    if left_out:
+        told = f"{len(left_out)} of {len(cases)} cases left out; the first: {left_out[0]}"
+        raise IncompleteError(text, [InputError(told)])
+    return text
 
 
 def select(known: dict[str, Stepping], names: list[str] | None) -> dict[str, Stepping]:
@@ -113,7 +125,7 @@ def _one(chosen: dict[str, Stepping], case: Case, options: Namespace, progress: 
             start = math.radians(case.angle)
             runs[name] = list(repeated(machine, trajectory, outer, start, options.repeat))
     except SimulationError as error:
-        return f"{title}: {error}"
+        raise InputError(f"{title}: {error}") from None
     if options.picture:
         save(picture({name: found[0] for name, found in runs.items()}), options.picture)
     return f"{title}\n\n{as_text(runs)}"

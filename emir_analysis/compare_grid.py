@@ -21,6 +21,7 @@ from emir_analysis.margin import gain_margin, linear_machine
 from emir_analysis.node_controls import Stepping
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import declared, with_values
+from emir_common.quantity import quantities
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import Machine
 from emir_plant.plant import SimulationError
@@ -50,6 +51,11 @@ class Case:
     payload: float = 0.0
     size: float = 63.75
     error: str = "none"
+
+    def __str__(self) -> str:
+        """Return the case in words."""
+        where = f"{self.angle:g} deg, {self.payload:g} kg, {self.size:g} mm"
+        return f"{where}, model error {self.error}"
 
     def machine(self, base: Machine) -> Machine:
         """Return the machine of this case."""
@@ -82,15 +88,16 @@ def results(
     controllers: Mapping[str, Stepping],
     cases: Sequence[Case],
     progress: Callable[[str], None],
-) -> list[Result]:
-    """Return each move of each controller in each case that the machine can do."""
+) -> tuple[list[Result], list[str]]:
+    """Return each move of each controller in each case that the machine can do.
+
+    Also, in words, the cases that it cannot do. Raises InputError where it can do none.
+    """
     found: list[Result] = []
+    left_out = []
     margins: dict[tuple[object, ...], dict[str, float]] = {}
     for k, case in enumerate(cases, 1):
-        progress(
-            f"{k} of {len(cases)}: {case.angle:g} deg, {case.payload:g} kg, {case.size:g} mm,"
-            f" model error {case.error}"
-        )
+        progress(f"{k} of {len(cases)}: {case}")
         try:
             for name, outer in controllers.items():
                 same = name, case.angle, case.payload, case.error  # whatever the size
@@ -99,9 +106,10 @@ def results(
                 found += _of_case(base, name, outer, case, margins[same])
         except SimulationError as error:
             progress(f"  left out: {error}")
+            left_out.append(f"{case}: {error}")
     if not found:
-        raise InputError("no case that the machine can do")
-    return found
+        raise InputError(f"no case that the machine can do; the first: {left_out[0]}")
+    return found, left_out
 
 
 def _of_case(
@@ -311,8 +319,14 @@ def write_csv(found: Sequence[Result], file: Path) -> None:
 def grid(axes: Mapping[str, Sequence[Any]]) -> list[Case]:
     """Return all combinations of the values by the names of Case's fields, in its order.
 
-    Raises InputError for a model error that is not known or a move of no size.
+    Raises InputError for a model error that is not known, a move of no size or an angle that no
+    boom has.
     """
+    reach = quantities(OperatingPoint)["angle"]
+    low, high = math.degrees(reach.low), math.degrees(reach.high)
+    for angle in axes["angle"]:
+        if not low <= angle <= high:
+            raise InputError(f"angle = {angle:g} deg: outside {low:.1f} ... {high:.1f} deg")
     for error in axes["error"]:
         if error not in ERRORS:
             raise InputError(f"model error {error!r}: there are {'; '.join(ERRORS)}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from emir_analysis import design_lqg
+from emir_analysis.compare_command import save
 from emir_analysis.design_pfc import (
     ANGLES,
     ORDERS,
@@ -23,6 +24,7 @@ from emir_analysis.design_pfc import (
 )
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, from_recording
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -32,16 +34,24 @@ from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
 RECORDED_ORDER = 4  # an ordinary run tells no more than the integrator and the slow mode
+OF_PFC = {
+    "order": None, "angle": 45.0, "payload": 0.0, "observer": 0.0, "schedule": False,
+    "coincidence": None, "response_time": None, "picture": None,
+}  # fmt: skip
 COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 
 def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
     """Design, check, write the file; return what to tell. Raises InputError, ParameterError."""
     options = _parser().parse_args(words)
-    recorded = _is_recording(Path(options.machine))
+    source = Path(options.machine)
+    check_outputs([options.out, options.picture], None, [source])
+    check_picture(options.picture)
+    recorded = _is_recording(source)
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
             raise InputError(f"--controller {options.controller}: a machine's YAML is needed")
+        _check_nothing_else(options)
         return design_lqg.command(_machine(options.machine), options, progress)
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
@@ -51,10 +61,12 @@ def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
 
 def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool) -> str:
     """As `command`, of a predictive controller; recorded: from a recording."""
+    if not 0.0 <= options.observer < math.inf:
+        raise ParameterError(f"observer = {options.observer:g} m/s: has to be 0 or more")
     output = OUTPUTS[options.controller]
     task = DesignTask(
         controller=options.controller,
-        order=options.order or (RECORDED_ORDER if recorded else ORDERS[output]),
+        order=_order(options.order, RECORDED_ORDER if recorded else ORDERS[output]),
         point=OperatingPoint(angle=math.radians(options.angle), payload=options.payload),
         observer=options.observer,
         tuning=_tuning(options),
@@ -72,15 +84,12 @@ def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool)
         else:
             parameters = design_pfc(machine, task)
     except SimulationError as error:
-        raise InputError(str(error)) from None
+        raise InputError(f"{options.machine}: {error}") from None
     pfc_file.save(options.out, parameters, output, _made_by(options, task))
     progress("stability over posture and payload")
     found = stability_map(machine, options.controller, parameters)
     if options.picture:
-        try:
-            picture(found).savefig(options.picture, dpi=120)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{options.picture}: {error}") from None
+        save(picture(found), options.picture)
     stable = "stable everywhere" if found.worst < 1.0 else "NOT stable everywhere (!)"
     return (
         f"{options.out}: {options.controller} of order {parameters.model.order}; {stable}\n"
@@ -118,6 +127,18 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     return parser
+
+
+def _check_nothing_else(options: Namespace) -> None:
+    """Raise InputError for an option that a design of lqg or mpc has no use for."""
+    given = {name for name, usual in OF_PFC.items() if getattr(options, name) != usual}
+    if given:
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(given))
+        raise InputError(f"{names}: of pfc and pfc_tip, not of {options.controller}")
+
+
+def _order(given: int | None, usual: int) -> int:
+    return usual if given is None else given
 
 
 def _is_recording(path: Path) -> bool:

@@ -16,6 +16,7 @@ from emir_analysis.compare_command import save, select
 from emir_analysis.disturbance import LoadChange, push
 from emir_analysis.limit import PAPER_MOVE
 from emir_analysis.node_controls import Stepping
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import EVERYDAY, controllers, turned_off
 from emir_common.parameter_tree import with_values
@@ -64,6 +65,8 @@ def command(words: Sequence[str], progress: Progress) -> str:
     parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="dynamic deflections")
     options = parser.parse_args(words)
+    check_outputs([options.picture], None, [])
+    check_picture(options.picture)
     stated = with_values(
         joint1(),
         {"supply.p0": EVERYDAY.supply, "effects.command_delay.delay": EVERYDAY.delay},

@@ -1,5 +1,7 @@
 """What a user can get wrong."""
 
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """A recording, file or setting cannot be used; the message is one line: what and where."""
@@ -14,3 +16,8 @@ class IncompleteError(InputError):
     def __init__(self, result: object, failed: list[InputError]) -> None:
         super().__init__("; ".join(map(str, failed)))
         self.result = result
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return the names that there are, for a message; "none" where there are none."""
+    return ", ".join(sorted(names)) or "none"

@@ -16,7 +16,7 @@ from scipy import linalg
 from scipy.signal import lfilter
 
 from emir_analysis import bags
-from emir_analysis.errors import InputError
+from emir_analysis.errors import InputError, listed
 from emir_analysis.run_signals import full_name
 from emir_analysis.signals import Source, load
 from emir_common.quantity import ParameterError
@@ -79,7 +79,7 @@ def from_recording(bag: Path, output: str, order: int) -> Identified:
 def _sources(bag: Path, topic: Topic, there: set[str]) -> dict[str, Source]:
     name = full_name(topic, there)
     if name is None:
-        raise InputError(f"{bag}: no topic {topic.name}; there are {', '.join(sorted(there))}")
+        raise InputError(f"{bag}: no topic {topic.name}; there are {listed(there)}")
     return {signal: Source(name, at.path, at.unit) for signal, at in topic.fields.items()}
 
 

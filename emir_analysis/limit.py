@@ -16,6 +16,7 @@ from emir_plant.parameters import Machine
 from emir_plant.record import record
 
 SHORTEST = 20 * STEP  # s
+LONGEST = 20.0  # s: memory and time of the optimization grow with its square
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,10 @@ def least(machine: Machine, move: Move) -> Motion:
 
     Raises ParameterError for a move that is none or that the valve's flow does not allow.
     """
-    if move.stroke == 0.0 or move.duration < SHORTEST:
+    if move.stroke == 0.0 or not SHORTEST <= move.duration <= LONGEST:
         raise ParameterError(
             f"a move of {move.stroke:g} m in {move.duration:g} s: wanted is one of"
-            f" {SHORTEST:g} s at least that goes somewhere"
+            f" {SHORTEST:g} ... {LONGEST:g} s that goes somewhere"
         )
     angle = turn(machine, move)
     low, high = joint_rates(machine, angle, move.stroke)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from emir_analysis.compare_command import save
 from emir_analysis.limit import PAPER_MOVE, Move, least, turn
+from emir_analysis.outputs import check_outputs, check_picture
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control.least_bending import STEP, Motion
@@ -19,6 +20,8 @@ from emir_plant.sheet import joint1
 def command(words: Sequence[str]) -> str:
     """Return the figures as text, draw the motion. Raises InputError or ParameterError."""
     options = _parser().parse_args(words)
+    check_outputs([options.picture], None, [])
+    check_picture(options.picture)
     machine = with_values(joint1(), {"geometry.payload": options.payload})
     move = Move(math.radians(options.angle), options.stroke * 1e-3, options.duration)
     found = least(machine, move)

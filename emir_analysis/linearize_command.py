@@ -48,6 +48,7 @@ def command(words: list[str], progress: Callable[[str], None]) -> str:
         machine = with_values(machine, {"geometry.payload": options.payload})
     for line in cautions(machine):
         progress(line)
+    _check_valve(options)
     velocity = None if options.command is not None else options.velocity * 1e-3
     if velocity == 0.0 or options.command == 0.0:
         raise InputError("at rest the valve is in its dead zone: the machine has to move")
@@ -57,11 +58,19 @@ def command(words: list[str], progress: Callable[[str], None]) -> str:
     return as_text(found) + f"\n{options.out / PICTURE}\n{options.out / NUMBERS}"
 
 
+def _check_valve(options: argparse.Namespace) -> None:
+    """Raise InputError for what no valve does: y2 is a share of its full opening."""
+    if options.command is not None and not abs(options.command) <= 1.0:
+        raise InputError(f"command = {options.command:g}: outside -1 ... 1")
+    if not 0.0 < abs(options.step) <= 1.0:
+        raise InputError(f"step = {options.step:g}: outside -1 ... 1, or none")
+
+
 def _models(machine: Machine, point: Point, options: argparse.Namespace) -> DesignModels:
     try:
         return design_models(Plant(machine), point, options.outputs, options.order, options.step)
     except SimulationError as error:
-        raise InputError(str(error)) from None
+        raise InputError(f"{options.machine}: {error}") from None
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from matplotlib.backend_bases import FigureCanvasBase
+
 from emir_analysis.errors import InputError
 
 
@@ -35,6 +37,13 @@ def check_outputs(
     if folder is not None:
         _check_apart(folder, given)
         _check_folder(folder, taken)
+
+
+def check_picture(file: Path | None) -> None:
+    """Raise InputError for a picture of a kind that cannot be drawn. None: not asked for."""
+    known = FigureCanvasBase.get_supported_filetypes()
+    if file is not None and file.suffix[1:].lower() not in known:
+        raise InputError(f"{file}: no kind of picture; there are .{', .'.join(sorted(known))}")
 
 
 def write_all(

@@ -7,7 +7,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
-from emir_analysis.rosbag2_writer import Rosbag2Writer
+from emir_analysis.rosbag2_writer import Rosbag2Writer, WriteError
 
 OWN = "rosbag2"  # the metadata record that the writer itself makes
 
@@ -24,14 +24,19 @@ def recover(bag: Path, folder: Path) -> Recovery:
     """Write every message of the recording that is readable to a new folder, as it was recorded.
 
     bag: as `bags.read`. A file is read up to its first damage. Raises InputError when no message
-    is readable, ParameterError when the folder exists.
+    is readable or the folder lies in the recording, ParameterError when it exists, WriteError for
+    such as a full disk.
     """
     files = bags.files(bag)
+    if folder.resolve().is_relative_to(bag.resolve()):
+        raise InputError(f"{folder}: lies in {bag}, which is read")
     damage = []
     with Rosbag2Writer(folder) as writer:
         for file in files:
             try:
                 _copy(file, writer)
+            except WriteError:
+                raise
             except InputError as error:
                 damage.append(str(error))
     if not writer.message_count:

@@ -18,6 +18,7 @@ from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS, ROBOT_VALVE_COMMAND
 from emir_msgs_py.topics import PLANT_PERIOD_NS
 from emir_plant.plant import SimulationError
 from emir_plant.robot.plant import RobotPlant
+from emir_plant.robot.reach import PostureError
 from emir_plant.robot.sheet import robot
 
 MAIN = "main."  # joint 1's parameters have no such word in front of them in the graph
@@ -59,7 +60,7 @@ def replay_robot_plant(
     try:
         state = plant.initial(posture.angles, pressure)
         return compared(ROBOT_PLANT_TOPICS, _rows(plant, state, orders, outputs))
-    except SimulationError as error:
+    except (PostureError, SimulationError) as error:
         raise ParameterError(f"plant: {error}") from None
 
 

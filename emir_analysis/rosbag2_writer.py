@@ -13,6 +13,7 @@ import yaml
 from mcap.records import Attachment, Schema
 from mcap.writer import CompressionType
 
+from emir_analysis.errors import InputError
 from emir_analysis.mcap_writer import MessageWriter
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
@@ -23,7 +24,7 @@ CHUNK = 256 * 1024
 COMPRESSIONS = {"none": CompressionType.NONE, "zstd": CompressionType.ZSTD}
 
 
-class WriteError(RuntimeError):
+class WriteError(InputError):
     """The recording cannot be written on; what was written is readable. One line."""
 
 
@@ -179,20 +180,23 @@ class Rosbag2Writer:
         """Announce a topic by its full name.
 
         schema: name, encoding and text of the type; its id is not used. metadata: as
-        `channel_metadata` returns it, or as it stands in another recording.
+        `channel_metadata` returns it, or as it stands in another recording. Raises WriteError.
         """
         self._topics[name] = Topic(name, schema, metadata)
-        self._file.announce(self._topics[name])
+        with self._watched():
+            self._file.announce(self._topics[name])
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
-        """Store a metadata record, texts by key, in the MCAP files."""
+        """Store a metadata record, texts by key, in the MCAP files. Raises WriteError."""
         self._metadata[name] = data
-        self._file.writer.add_metadata(name, data)
+        with self._watched():
+            self._file.writer.add_metadata(name, data)
 
     def add_attachment(self, attachment: Attachment) -> None:
-        """Store an attachment in the MCAP files."""
+        """Store an attachment in the MCAP files. Raises WriteError."""
         self._attachments.append(attachment)
-        self._file.attach(attachment)
+        with self._watched():
+            self._file.attach(attachment)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """Store one message; times in ns. Raises WriteError, such as for a full disk."""

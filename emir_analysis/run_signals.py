@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis import bags
-from emir_analysis.errors import InputError
+from emir_analysis.errors import InputError, listed
 from emir_analysis.signals import Recording, Source, load
 from emir_msgs_py.robot_topics import (
     PRESSURES,
@@ -57,7 +57,7 @@ def load_run(path: Path) -> Recording:
             fields = topic.fields.items()
             sources |= {signal: Source(name, about.path, about.unit) for signal, about in fields}
         elif topic in needed:
-            raise InputError(f"{path}: no topic {topic.name}; there are {', '.join(sorted(there))}")
+            raise InputError(f"{path}: no topic {topic.name}; there are {listed(there)}")
     return load(path, sources)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis import bags, columns
-from emir_analysis.errors import InputError
+from emir_analysis.errors import InputError, listed
 from emir_analysis.node_controls import Signals
 from emir_analysis.run_signals import full_name
 from emir_msgs_py.topics import Topic
@@ -72,7 +72,7 @@ def by_stamp(bag: Path, topics: Sequence[Topic], period: int) -> dict[int, Signa
     names = {topic.name: full_name(topic, there) for topic in topics}
     for name, full in names.items():
         if full is None:
-            raise InputError(f"{bag}: no topic {name}; there are {', '.join(sorted(there))}")
+            raise InputError(f"{bag}: no topic {name}; there are {listed(there)}")
     paths = {topic.name: [about.path for about in topic.fields.values()] for topic in topics}
     recorded = columns.read(bag, {full: paths[name] for name, full in names.items() if full})
     found = [_rows(topic, recorded[names[topic.name] or ""], period) for topic in topics]

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from emir_analysis.outputs import write_text
+from emir_analysis.outputs import check_outputs, write_text
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
@@ -29,6 +29,7 @@ def command(options: argparse.Namespace) -> str:
     from emir_plant.robot.dynamics import Mechanics  # noqa: PLC0415 (needs Pinocchio)
     from emir_plant.robot.urdf import urdf  # noqa: PLC0415
 
+    check_outputs([options.file], None, [options.robot, options.machine])
     text = urdf(Mechanics(robot(options.robot, options.machine)))
     write_text(options.file, text + "\n")
     model = pin.buildModelFromUrdf(str(options.file))

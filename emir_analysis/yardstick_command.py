@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emir_analysis.compare_command import save, select
-from emir_analysis.outputs import write_text
+from emir_analysis.outputs import check_outputs, check_picture, write_text
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import (
     AIM_HARD,
@@ -43,6 +43,8 @@ FIGURES = (  # field, title, factor to the unit shown
 def command(words: Sequence[str], progress: Progress) -> str:
     """Draw, run, write, return the table. Raises InputError or ParameterError."""
     options = _parser().parse_args(words)
+    check_outputs([options.picture, options.json], None, [])
+    check_picture(options.picture)
     if options.draws < 1:
         raise ParameterError(f"draws = {options.draws}: at least 1")
     among = dataclasses.replace(HARD if options.hard else EVERYDAY, supply=options.supply * 1e5)

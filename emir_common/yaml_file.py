@@ -1,5 +1,6 @@
 """Reading a YAML file that holds a map, with one clear line for what is wrong with it."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,10 @@ from emir_common.quantity import ParameterError
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML in which no key of a map stands twice: the first would be lost without a word."""
+    """YAML in which no key of a map stands twice: the first would be lost without a word.
+
+    And in which 2e7 is a number as it is for ROS and by YAML 1.2; the library wants 2.0e+7.
+    """
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 (as in the library)
         """Return the map. Raises ConstructorError for a key that stands twice."""
@@ -24,6 +28,18 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)
 
 
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"),
+    list("-+.0123456789"),
+)
+
+
+def read_value(text: str) -> Any:
+    """Return what a text is as YAML. Raises yaml.YAMLError for what is none."""
+    return yaml.load(text, _Loader)  # noqa: S506 (a SafeLoader)
+
+
 def read_map(file: Path, *, what: str) -> dict[Any, Any]:
     """Return the map that a YAML file holds.
 
@@ -31,7 +47,7 @@ def read_map(file: Path, *, what: str) -> dict[Any, Any]:
     naming the file, for one that cannot be read, is not YAML, holds no map or a key twice.
     """
     try:
-        content = yaml.load(file.read_text(encoding="utf-8"), _Loader)  # noqa: S506 (a SafeLoader)
+        content = read_value(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ParameterError(f"{file}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:

@@ -28,6 +28,7 @@ from emir_analysis.bench.reading import reading_figures
 from emir_analysis.bench.timing import Figure, text, write_json
 from emir_analysis.columns import Columns
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs
 from emir_common.quantity import ParameterError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
@@ -36,6 +37,7 @@ from emir_ros.graph import Plan
 from emir_ros.main import keep_out_of_garbage_collection, make_executor
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
+from emir_ros.start import INTERRUPTED
 from emir_ros.wire import Wire, stamp_ns
 
 Array = NDArray[np.float64]
@@ -52,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Measure what the arguments say; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
+        check_outputs([options.json], None, [])
         found = {}
         for title, figures in _parts(options):
             print(text(title, figures), flush=True)  # noqa: T201 (a command prints)
@@ -121,7 +124,10 @@ def _lockstep(folder: Path, processes: str, simulated: float) -> Part:
 
 
 def _run(plan: Plan, processes: str) -> None:
-    if run_plan(plan, processes) != 0:
+    code = run_plan(plan, processes)
+    if code == INTERRUPTED:
+        raise KeyboardInterrupt
+    if code != 0:
         raise NodeError("the graph did not run to its end")
 
 

@@ -17,7 +17,6 @@ from emir_analysis.switching import Selector, Switch
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
-from emir_common.yaml_file import read_map
 from emir_control.robot_trajectory import RobotTrajectoryInputs
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
@@ -25,6 +24,7 @@ from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS, VALVE_L
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 from emir_ros.machines import Start
+from emir_ros.run_parameters import WILDCARDS, reaches, read_entries, values_of
 
 CONTROLLERS: dict[str, tuple[str, ...]] = {
     name: ("trajectory_node", f"{name}_node", "force_loop_node")
@@ -35,7 +35,6 @@ NODES = tuple(dict.fromkeys(  # each once
     ("recorder_node", *(node for nodes in CONTROLLERS.values() for node in nodes),
      "selector_node", "plant_node")
 ))  # fmt: skip
-EVERY_NODE = "/**"
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
 OF_THE_NODE = ("trajectory", *OF_EVERY_NODE)  # of trajectory_node, but not of its trajectory
 ROBOT_FILES = ("robot_file", "machine_file")
@@ -98,16 +97,28 @@ def check(plan: Plan) -> None:
         raise ParameterError(f"{plan.bag}: exists already, and is not overwritten")
     if plan.duration is not None and not 0.0 < plan.duration < float("inf"):
         raise ParameterError(f"duration = {plan.duration:g} s: has to be positive")
-    for node in read_parameters(plan.params):
-        if node not in (*NODES, EVERY_NODE):
-            raise ParameterError(
-                f"{plan.params}: {node}: no such node; there are {', '.join(NODES)}"
-            )
+    _check_entries(plan)
     end = duration(plan)
     for switch in plan.switches:
         if switch.time >= end:
             raise ParameterError(
                 f"--switch {switch.time:g}={switch.name}: the run is over after {end:g} s"
+            )
+
+
+def _check_entries(plan: Plan) -> None:
+    """Raise ParameterError, naming file and node, for no node of a run or for another model's."""
+    for pattern, values in read_entries(plan.params).items():
+        where, name = f"{plan.params}: {pattern}: ", pattern.rsplit("/", 1)[-1]
+        if name not in (*NODES, *WILDCARDS):
+            raise ParameterError(f"{where}no such node; there are {', '.join(NODES)}")
+        model = values.get("model", plan.model)
+        if model not in list(MODELS):
+            raise ParameterError(f"{where}model {model!r}: there are {', '.join(MODELS)}")
+        if model != plan.model and any(reaches(pattern, n, plan.namespace) for n in NODES):
+            raise ParameterError(
+                f"{where}for the model {model}, and the run is of {plan.model}:"
+                f" give --model {model}"
             )
 
 
@@ -127,7 +138,7 @@ def _check_model(plan: Plan) -> None:
 
 def duration(plan: Plan) -> float:
     """Return how long the run takes, s. Raises ParameterError for a trajectory that cannot be."""
-    given = read_parameters(plan.params)
+    given = read_parameters(plan)
     given_to_node = given.get("trajectory_node", {})
     own = {
         name: value
@@ -146,7 +157,6 @@ def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
 
 def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
     """Return how long the robot's trajectory takes, s, from where and with what it is to start."""
-    own = {k: v for k, v in given.get(EVERY_NODE, {}).items() if k in ROBOT_FILES} | own
     with _told_by(plan, "trajectory_node", own):
         files = (own.pop(key, "") for key in ROBOT_FILES)
         sheet = robot(*(Path(str(name)) if name else None for name in files))
@@ -176,69 +186,55 @@ def _told_by(plan: Plan, node: str, values: Collection[str]) -> Iterator[None]:
         raise ParameterError(f"{where}{error}") from None
 
 
-def read_parameters(file: Path | None) -> dict[str, dict[str, Any]]:
-    """Return a ROS 2 parameter file as {node: {dotted name: value}}; {} for None.
+def read_parameters(plan: Plan) -> dict[str, dict[str, Any]]:
+    """Return what the plan's parameter file says to nodes of its run, {node: {name: value}}.
 
     Raises ParameterError, naming file and node, for what is no such file.
     """
-    if file is None:
-        return {}
-    found = {}
-    for node, entry in read_map(file, what="node").items():
-        if not isinstance(entry, dict) or not isinstance(entry.get("ros__parameters"), dict):
-            raise ParameterError(f"{file}: {node}: ros__parameters is missing")
-        name = node if node == EVERY_NODE else str(node).rsplit("/", 1)[-1]
-        found[name] = _flat(entry["ros__parameters"])
-    return found
-
-
-def _flat(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = value
-    return flat
+    entries = read_entries(plan.params)
+    found = {node: values_of(entries, node, plan.namespace) for node in NODES}
+    return {node: values for node, values in found.items() if values}
 
 
 @contextmanager
 def ros_arguments(plan: Plan) -> Iterator[list[str]]:
     """Give the ROS arguments that every node of the run gets, valid inside the context."""
+    given, own = read_parameters(plan), _run_parameters(plan)
+    nodes = {f"/**/{node}": {"ros__parameters": given.get(node, {}) | own[node]} for node in NODES}
     with tempfile.TemporaryDirectory(prefix="emir-") as folder:
-        own = Path(folder) / "run.yaml"
-        own.write_text(yaml.safe_dump(_run_parameters(plan)), encoding="utf-8")
-        given = Path(folder) / "given.yaml"
-        given.write_text(yaml.safe_dump(_in_any_namespace(plan.params)), encoding="utf-8")
-        files = [given, own] if plan.params else [own]  # the later file prevails
-        words = [word for file in files for word in ("--params-file", str(file))]
+        file = Path(folder) / "run.yaml"
+        file.write_text(yaml.safe_dump(nodes), encoding="utf-8")
+        words = ["--params-file", str(file)]
         if plan.namespace:
             words += ["-r", f"__ns:=/{plan.namespace}"]
         yield ["--ros-args", *words]
 
 
-def unused(plan: Plan) -> str:
-    """Return what of the parameter file the run sets itself, to another value; "": nothing."""
-    run = _run_parameters(plan)
-    of_all = run[EVERY_NODE]["ros__parameters"]
-    found = []
-    for node, given in read_parameters(plan.params).items():
-        own = of_all | run.get(f"/**/{node}", {}).get("ros__parameters", {})
-        names = [name for name, value in given.items() if own.get(name, value) != value]
+def unused(plan: Plan) -> list[str]:
+    """Return what of the parameter file the run does not take, a line for each reason."""
+    own, lines = _run_parameters(plan), []
+    elsewhere, found = [], []
+    for pattern, given in read_entries(plan.params).items():
+        nodes = [node for node in NODES if reaches(pattern, node, plan.namespace)]
+        if not nodes:
+            elsewhere.append(pattern)
+        names = [
+            name
+            for name, value in given.items()
+            if any(own[node].get(name, value) != value for node in nodes)
+        ]
         if names:
-            found.append(f"{node}: {', '.join(names)}")
-    return "; ".join(found)
+            found.append(f"{pattern}: {', '.join(names)}")
+    if found:
+        lines.append(f"not used, the run sets it: {'; '.join(found)}")
+    if elsewhere:
+        lines.append(f"not used, of another namespace: {', '.join(elsewhere)}")
+    return lines
 
 
-def _in_any_namespace(file: Path | None) -> dict[str, Any]:
-    """Return a parameter file in which a node named without a path is meant wherever it is."""
-    content = read_map(file, what="node") if file else {}
-    return {key if "/" in key else f"/**/{key}": entry for key, entry in content.items()}
-
-
-def _run_parameters(plan: Plan) -> dict[str, Any]:
+def _run_parameters(plan: Plan) -> dict[str, dict[str, Any]]:
+    """Return what the run itself sets, of each node."""
     nodes: dict[str, dict[str, Any]] = {
-        EVERY_NODE: {"lockstep": plan.lockstep, "model": plan.model},
         "plant_node": {"duration": float(duration(plan)), "wait_for_recorder": True},
         "trajectory_node": _trajectory_parameters(plan),
         "recorder_node": {
@@ -252,15 +248,13 @@ def _run_parameters(plan: Plan) -> dict[str, Any]:
         nodes["selector_node"] = _selector_parameters(plan)
         nodes |= {f"{name}_node": {"standby": True} for name in plan.controllers}
         nodes["force_loop_node"] = {"standby": not set(VALVE_LOOPS).isdisjoint(plan.controllers)}
-    return {
-        node if node == EVERY_NODE else f"/**/{node}": {"ros__parameters": values}
-        for node, values in nodes.items()
-    }
+    of_every_node = {"lockstep": plan.lockstep, "model": plan.model}
+    return {node: of_every_node | nodes.get(node, {}) for node in NODES}
 
 
 def _trajectory_parameters(plan: Plan) -> dict[str, Any]:
     """Return the trajectory's name and, if another than the sheet's, the robot's pump pressure."""
-    given = read_parameters(plan.params)
+    given = read_parameters(plan)
     pressure = given.get("plant_node", {}).get("supply.p0")
     if plan.model != ROBOT or pressure is None:
         return {"trajectory": plan.trajectory}
@@ -291,5 +285,5 @@ def _description(plan: Plan) -> dict[str, str]:
         "trajectory": plan.trajectory,
         "duration": f"{duration(plan):g} s",
         "time": "lockstep" if plan.lockstep else "realtime",
-        "parameters": json.dumps(read_parameters(plan.params)),
+        "parameters": json.dumps(read_parameters(plan)),
     }

@@ -15,8 +15,9 @@ from rclpy.clock_type import ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
-from emir_ros.shell import FAILURES, Shell, starting
+from emir_ros.shell import FAILURES, NodeError, Shell, starting
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -45,9 +46,13 @@ class StopRequest:
 
 
 def start_ros() -> StopRequest:
-    """Initialize rclpy; returns what SIGINT and SIGTERM set from now on."""
+    """Initialize rclpy; returns what SIGINT and SIGTERM set from now on.
+
+    Before that: an exception out of it would leave a context that nobody shuts down.
+    """
+    stop = StopRequest()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    return StopRequest()
+    return stop
 
 
 @contextmanager
@@ -118,11 +123,21 @@ def run(node_class: Callable[[], Shell]) -> None:
     sys.exit(_run(node_class))
 
 
+def _check_words(words: list[str]) -> None:
+    """Raise NodeError for words that no node knows: parameters without --ros-args among them."""
+    if words:
+        raise NodeError(
+            f"cannot start: {' '.join(words)}: not known; parameters are given by"
+            " --ros-args -p NAME:=VALUE"
+        )
+
+
 def _run(node_class: Callable[[], Shell]) -> int:
     node: Shell | None = None
     try:
         with starting():
             stop = start_ros()
+            _check_words(remove_ros_args(sys.argv)[1:])
             node = node_class()
         with make_executor() as executor:
             executor.add_node(node)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from emir_analysis.recorded_parameters import OF_A_TOPIC
 from emir_common.parameter_tree import declared, with_values
@@ -19,6 +20,7 @@ from emir_control import pfc_file
 from emir_control.pfc import Form, Future, PfcParameters
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import TOPICS
+from emir_plant.plant import SimulationError
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.sheet import robot
 from emir_ros import qos
@@ -92,11 +94,14 @@ def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParam
 
 @contextmanager
 def naming(node: Node) -> Iterator[None]:
-    """Put the node's name in front of what is wrong with its parameters, if it is not there."""
+    """Put the node's name in front of what is wrong with its parameters, if it is not there.
+
+    A machine that cannot be as they say (SimulationError) is a ParameterError, too.
+    """
     name = f"{node.get_name()}: "
     try:
         yield
-    except ParameterError as error:
+    except (ParameterError, SimulationError) as error:
         raise ParameterError(name + str(error).removeprefix(name)) from None
 
 
@@ -123,23 +128,32 @@ def declare(node: Node, name: str, default: Any, description: str, *, fixed: boo
 def reject_unknown(node: Node) -> None:
     """Raise ParameterError if a value was given for a parameter that the node does not have.
 
-    A topic's quality of service may be given to all nodes, and in lock step to none.
+    Those of a topic's quality of service are left to `check_overrides`.
     """
-    # rclpy keeps the values from command line and files here and offers no other way to them
-    for name in node._parameter_overrides:  # noqa: SLF001
-        if node.has_parameter(name) or name == "start_type_description_service":
-            continue
-        if name.startswith(OF_A_TOPIC):
-            _check_override(node, name)
-        else:
+    for name in _given(node):
+        known = node.has_parameter(name) or name == "start_type_description_service"
+        if not known and not name.startswith(OF_A_TOPIC):
             raise _unknown(node, name, "parameter", _known_beside(node, name))
 
 
-def _check_override(node: Node, name: str) -> None:
-    """Raise ParameterError for the quality of a topic that no node would take.
+def _given(node: Node) -> dict[str, Parameter]:
+    """Return the values from command line and files; rclpy offers no other way to them."""
+    found: dict[str, Parameter] = node._parameter_overrides  # noqa: SLF001
+    return found
 
-    Another node may have the topic.
+
+def check_overrides(node: Node) -> None:
+    """Raise ParameterError for a topic's quality of service that no node would take.
+
+    To be called before any topic is published or subscribed to. It may be given to all nodes, also
+    to those without the topic, and in lock step to none.
     """
+    for name, given in _given(node).items():
+        if name.startswith(OF_A_TOPIC):
+            _check_override(node, name, given.value)
+
+
+def _check_override(node: Node, name: str, value: Any) -> None:
     if node.get_parameter("lockstep").value:
         raise ParameterError(f"{node.get_name()}: {name}: fixed in lock step")
     topic, *words = name.removeprefix(OF_A_TOPIC).split(".")
@@ -149,6 +163,10 @@ def _check_override(node: Node, name: str) -> None:
     keys = {f"{end}.{key}" for end in ("publisher", "subscription") for key in qos.OVERRIDABLE}
     if ".".join(words) not in keys:
         raise _unknown(node, name, "quality", keys)
+    try:
+        qos.check_override(words[-1], value)
+    except ParameterError as error:
+        raise ParameterError(f"{node.get_name()}: {name} = {error}") from None
 
 
 def _unknown(node: Node, name: str, what: str, known: Collection[str]) -> ParameterError:

@@ -167,7 +167,8 @@ class PlantNode(Shell):
         """Take a step that does not count: the very first compiles the machine, for seconds."""
         machine = self.machine
         state, truth = machine.state, machine.truth
-        machine.step(self._shut, PLANT_PERIOD_NS * 1e-9)
+        with naming(self):
+            machine.step(self._shut, PLANT_PERIOD_NS * 1e-9)
         machine.state, machine.truth = state, truth
 
     def _figures(self) -> dict[str, str]:

@@ -12,15 +12,20 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
 
+from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
 
 DEPTH = 64  # plant periods: half a second of sensor data
 
 LEASE = Duration(seconds=1.0)  # after which a publisher without sign of life counts as dead
 
-OVERRIDABLE = (
-    "history", "depth", "reliability", "durability", "deadline", "liveliness_lease_duration",
-)  # fmt: skip
+WORDS = {
+    "history": HistoryPolicy, "reliability": ReliabilityPolicy, "durability": DurabilityPolicy
+}  # fmt: skip
+NUMBERS = {  # least and most; of times, ns
+    "depth": (1, 2**31 - 1), "deadline": (0, 2**63 - 1), "liveliness_lease_duration": (0, 2**63 - 1)
+}  # fmt: skip
+OVERRIDABLE = (*WORDS, *NUMBERS)
 
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # how rosbag2 writes "no limit"
 
@@ -66,6 +71,21 @@ def overridable(*, lockstep: bool) -> QoSOverridingOptions | None:
     if lockstep:
         return None
     return QoSOverridingOptions([QoSPolicyKind[name.upper()] for name in OVERRIDABLE])
+
+
+def check_override(policy: str, value: Any) -> None:
+    """Raise ParameterError for a value that a policy of OVERRIDABLE cannot have.
+
+    What rcl has against it, it says in several lines, or it takes it for no limit.
+    """
+    if policy in NUMBERS:
+        low, high = NUMBERS[policy]
+        if type(value) is not int or not low <= value <= high:
+            raise ParameterError(f"{value!r}: not a whole number of {low} ... {high}")
+    else:
+        known = [word.lower() for word in WORDS[policy].__members__ if word != "UNKNOWN"]
+        if str(value).lower() not in known:
+            raise ParameterError(f"{value!r}: there are {', '.join(known)}")
 
 
 def requested(topic: Topic, *, lockstep: bool) -> QoSProfile:

@@ -94,13 +94,15 @@ class RecorderNode(Shell):
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
         with naming(self):
             self._writer = writer()
-        self._writer.add_metadata("emir", metadata)
+        self._failed = False
+        with self._watched():
+            self._writer.add_metadata("emir", metadata)
         ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._acknowledge = sender(ack)
-        self._failed = False
         self.changes = 0  # of parameters, recorded
         self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
-        self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
+        with self._watched():
+            self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
         self._pending: defaultdict[int, dict[str, bytes]] = defaultdict(dict)  # by stamp, full name
         self._next = 0
         for topic in self._topics:
@@ -179,7 +181,8 @@ class RecorderNode(Shell):
         profile = qos.offered(lockstep=self.lockstep)
         about = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
-        self._writer.add_topic(full_name, schema(topic.type), about)
+        with self._watched():
+            self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive_by_stamp(data: bytes) -> None:
             stamp = stamp_ns(data)
@@ -236,12 +239,13 @@ class RecorderNode(Shell):
         """
         if not self._answers or self._shape is None:
             return
-        self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
-        machine = machine_record(self._answers.get(PLANT, {}))
-        if machine:
-            self._writer.add_metadata(MACHINE, machine)
-        for name, values in self._answers.items():
-            self._attach_files(name, values)
+        with self._watched():
+            self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+            machine = machine_record(self._answers.get(PLANT, {}))
+            if machine:
+                self._writer.add_metadata(MACHINE, machine)
+            for name, values in self._answers.items():
+                self._attach_files(name, values)
         if self._shape:
             self._attach_shape()
         self._described = True
@@ -256,7 +260,8 @@ class RecorderNode(Shell):
 
     def _attach_shape(self) -> None:
         data = (self._shape or "").encode()
-        self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
+        with self._watched():
+            self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
 
     def _on_change(self, event: ParameterEvent) -> None:
         """Store what was set at a node while it runs, with the recording's own time."""
@@ -266,7 +271,8 @@ class RecorderNode(Shell):
         for parameter in event.changed_parameters:
             value = parameter_value_to_python(parameter.value)
             change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
-            self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
+            with self._watched():
+                self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
             self.changes += 1
 
 

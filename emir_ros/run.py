@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     plan = Plan(
         bag=options.bag,
         controller=options.controller,
-        trajectory=options.trajectory or DEFAULT_TRAJECTORY,
+        trajectory=DEFAULT_TRAJECTORY if options.trajectory is None else options.trajectory,
         duration=options.duration,
         params=options.params,
         lockstep=not options.realtime,
@@ -64,8 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         not_used = unused(plan)
     except ParameterError as error:
         return _complain(str(error), 1)
-    if not_used:
-        sys.stderr.write(f"emir run: {plan.params}: not used, the run sets it: {not_used}\n")
+    for line in not_used:
+        sys.stderr.write(f"emir run: {plan.params}: {line}\n")
     code = run_plan(plan, options.processes)
     if plan.bag.is_dir():  # what there is, however it ended
         shown = _show(plan.bag)
@@ -75,13 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _trajectory(plan: Plan) -> str:
     """Return the trajectory that the parameter file names, if it names one."""
-    own = read_parameters(plan.params).get("trajectory_node", {})
+    own = read_parameters(plan).get("trajectory_node", {})
     return str(own.get("trajectory", plan.trajectory))
 
 
 def _duration(plan: Plan) -> float | None:
     """Return for how long the parameter file lets the machine run, s; None: it does not say."""
-    given = read_parameters(plan.params).get("plant_node", {})
+    given = read_parameters(plan).get("plant_node", {})
     wanted = {name: value for name, value in given.items() if name == "duration"}
     try:
         return with_values(PlantNodeParameters(), wanted).duration or None
@@ -166,6 +166,10 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # nobody looks at `stop` any more
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if stop.made:  # while it ended by itself: whoever called has more to do
+        raise KeyboardInterrupt
 
 
 def _node_class(name: str) -> Callable[[list[str]], Shell]:

@@ -21,7 +21,7 @@ from emir_plant.plant import SimulationError
 from emir_ros import qos
 from emir_ros.diagnostics import REPEAT, Diagnostics, Level
 from emir_ros.input_watch import InputWatch
-from emir_ros.node_parameters import declare
+from emir_ros.node_parameters import check_overrides, declare
 from emir_ros.wire import Wire, sender
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ class Shell(LifecycleNode):
         self.model: str = declare(self, "model", JOINT1, f"{JOINT1}, or {ROBOT}: the whole robot")
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
+        check_overrides(self)
         self._outputs: dict[str, Callable[[int, Mapping[str, float]], None]] = {}
         self.last_stamp = -1  # ns, of the latest step in lock step
         self.diagnostics = Diagnostics(self, self.now_ns, lockstep=self.lockstep)
@@ -217,6 +218,8 @@ class Shell(LifecycleNode):
             self._fail(error)
 
     def _fail(self, error: Failure) -> None:
+        if isinstance(error, SimulationError):  # which knows of no nodes
+            error = NodeError(f"{self.get_name()}: {error}")
         self.failure = self.failure or error
         self.end()
 

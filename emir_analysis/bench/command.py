@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 from emir_analysis.bench.timing import Figure, text, write_json
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs
 
 Part = Callable[[float], Iterator[tuple[str, list[Figure]]]]
 
@@ -38,6 +39,7 @@ def command(options: argparse.Namespace, show: Callable[[str], None]) -> None:
     """Measure what the options say, a part shown as soon as it is there."""
     if not options.seconds > 0.0:
         raise InputError(f"--seconds {options.seconds:g}: has to be positive")
+    check_outputs([options.json], None, [])
     found = {}
     for title, figures in PARTS[options.what](options.seconds):
         show(text(title, figures))

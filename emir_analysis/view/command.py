@@ -25,12 +25,14 @@ def command(words: list[str], live: Callable[[list[str]], int]) -> int:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--bag", type=Path, help="a recording of the graph")
     source.add_argument("--live", action="store_true", help="the graph that is running")
-    parser.add_argument("--model", default="joint1", help="with --live: joint1 or robot")
+    parser.add_argument("--model", help="with --live: joint1 (default) or robot")
     parser.add_argument("--port", type=int, default=8080, help="of the page, default 8080")
     options = parser.parse_args(words)
     if options.live:
-        model = f"model:={options.model}"
+        model = f"model:={options.model or 'joint1'}"
         return live(["--ros-args", "-p", f"port:={options.port}", "-p", model])
+    if options.model is not None:
+        raise InputError("--model is for --live: a recording says itself whose it is")
     recording = load_run(options.bag)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

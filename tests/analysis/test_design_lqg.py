@@ -34,11 +34,15 @@ def test_it_writes_the_nodes_parameters_and_shows_the_map(
 def test_what_cannot_be_is_one_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
     words = ["design", "--controller", "mpc", "--out", str(tmp_path / "mpc.yaml")]
     for more, said in (
         (["--oil-tolerance", "0"], "oil_tolerance = 0: over 0 and up to 0.5"),
         (["--oil-tolerance", "nan"], "oil_tolerance = nan"),
-        (["--from", str(tmp_path)], "--controller mpc: a machine's YAML is needed"),
+        (["--order", "3"], "--order: of pfc and pfc_tip, not of mpc"),
+        (["--schedule", "--angle", "30"], "--angle, --schedule: of pfc and pfc_tip"),
+        (["--from", str(bag)], "--controller mpc: a machine's YAML is needed"),
     ):
         assert main([*words, *more]) == 1
         assert said in capsys.readouterr().err

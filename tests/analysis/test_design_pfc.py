@@ -154,9 +154,12 @@ def test_design_command_writes_file_and_picture_and_says_where_it_is_stable(
     [
         (["--controller", "magic"], "controller 'magic': there are pfc, pfc_tip"),
         (["--order", "40"], "order = 40: the model allows"),
+        (["--order", "0"], "order = 0: the model allows"),
+        (["--observer", "-1"], "observer = -1 m/s: has to be 0 or more"),
+        (["--observer", "nan"], "observer = nan m/s: has to be 0 or more"),
         (["--from", "nowhere.yaml"], "nowhere.yaml: No such file"),
         (["--angle", "200"], "angle = 3.49"),
-        (["--payload", "3000", "--angle", "20"], "no such motion|the boom needs"),
+        (["--payload", "3000", "--angle", "20"], "design: joint1: at 20.0 deg the boom needs"),
         (["--coincidence", "25"], "rising numbers from 1 to 20"),
     ],
 )

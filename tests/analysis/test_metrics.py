@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from mcap.writer import Writer
 
 from emir_analysis.cli import main
 from emir_analysis.errors import InputError
@@ -120,3 +121,21 @@ def test_several_recordings_make_one_table(
 def test_a_recording_of_something_else_is_refused(shared: Path) -> None:
     with pytest.raises(InputError, match="no topic cylinder_states; there are /rig"):
         load_run(shared / "recordings" / "elm_a")
+
+
+@pytest.mark.parametrize(
+    "words", [["analyze"], ["replay", "--node", "cascade"], ["view", "--bag"], ["design", "--from"]]
+)
+def test_a_recording_without_messages_is_refused(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / "none.mcap"
+    with bag.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()  # type: ignore[no-untyped-call]  # mcap's, untyped
+        writer.finish()  # type: ignore[no-untyped-call]
+    more = ["--out", str(tmp_path / "pfc.yaml")] if words[0] == "design" else []
+    assert main([*words, str(bag), *more]) == 1
+    *_, told = capsys.readouterr().err.splitlines()
+    assert told.startswith(f"emir {words[0]}: {bag}: no topic ")
+    assert told.endswith("; there are none")

@@ -1,5 +1,6 @@
 """Recordings cut off at any byte are made whole; `rosbags` is the judge of that."""
 
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -146,3 +147,30 @@ def test_a_writer_killed_outright_loses_no_whole_chunk(tmp_path: Path) -> None:
     with (tmp_path / "whole" / "whole_0.mcap").open("rb") as stream:
         messages = [message for _, _, message in make_reader(stream).iter_messages()]
     assert [m.data for m in messages] == [bytes([k % 256]) * 1000 for k in range(saved.messages)]
+
+
+def test_a_full_disk_is_one_line_and_keeps_what_was_written(tmp_path: Path) -> None:
+    """A limit on the file's size stands for the end of the disk; the system says the same."""
+    script = "import sys; from emir_analysis.cli import main; sys.exit(main(sys.argv[1:]))"
+    out, limit = tmp_path / "whole", 300_000
+    finished = subprocess.run(
+        [sys.executable, "-c", script, "bag", "recover", str(OWN_BAG), "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )
+    assert finished.returncode == 1
+    (line,) = finished.stderr.splitlines()
+    assert line.startswith(f"emir bag: {out / 'whole_0.mcap'}: File too large: recording ended")
+    assert recover(out, tmp_path / "again").messages > 0
+
+
+def test_nothing_is_recovered_into_the_recording_itself(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = _cut(OWN_BAG, tmp_path / "cut", 0.5)
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["bag", "recover", str(bag), "--out", str(bag / "in" / "it")]) == 1
+    assert f"lies in {bag}, which is read" in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before

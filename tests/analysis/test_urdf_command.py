@@ -23,5 +23,5 @@ def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["urdf", str(tmp_path / "a"), "--robot", str(tmp_path / "none.yaml")]) == 1
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 2
-    assert "No such file" in lines[0]
+    assert "no such folder" in lines[0]
     assert "none.yaml" in lines[1]

@@ -150,3 +150,5 @@ def test_bad_input_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().err == "emir view: nowhere: no such recording\n"
     assert main(["view", "--bag", str(LIFT), "--port", "70000"]) == 1
     assert "--port 70000" in capsys.readouterr().err
+    assert main(["view", "--bag", str(LIFT), "--model", "robot"]) == 1
+    assert "--model is for --live" in capsys.readouterr().err

@@ -145,7 +145,9 @@ def test_limit_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert "by less than" in capsys.readouterr().out
     assert image.read_bytes().startswith(b"\x89PNG")
     for words, said in (
-        (["--stroke", "0"], "one of 0.2 s at least that goes somewhere"),
+        (["--stroke", "0"], "one of 0.2 ... 20 s that goes somewhere"),
+        (["--duration", "nan"], "0.06375 m in nan s: wanted is one of 0.2 ... 20 s"),
+        (["--duration", "120"], "0.06375 m in 120 s: wanted is one of 0.2 ... 20 s"),
         (["--stroke", "500", "--duration", "1"], "no motion turns the joint"),
         (["--stroke", "9000"], "the triangle of joint 1 ends before"),
         (["--payload", "-3"], "geometry.payload = -3"),

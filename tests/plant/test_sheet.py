@@ -68,6 +68,15 @@ def test_a_bad_file_is_told_in_one_line(tmp_path: Path, old: str, new: str, said
     assert "\n" not in message
 
 
+@pytest.mark.parametrize("written", ["5e8", "50e+7", "5.0e8", "0.5E9", "+.5e9", "500000000"])
+def test_a_number_may_be_written_as_ros_and_yaml_1_2_have_it(written: str, tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    text = FILE.read_text()
+    assert "beta: {value: 5.0e+8" in text
+    file.write_text(text.replace("beta: {value: 5.0e+8", f"beta: {{value: {written}"))
+    assert load_sheet(file).machine.cylinder.beta == 5e8
+
+
 def test_a_missing_parameter_is_named(tmp_path: Path) -> None:
     bad = tmp_path / "machine.yaml"
     lines = [line for line in FILE.read_text().splitlines() if "threshold" not in line]

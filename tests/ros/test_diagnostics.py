@@ -169,6 +169,30 @@ def test_an_override_of_what_nobody_has_is_told(case: str) -> None:
     assert f"force_loop_node: qos_overrides.{name}: there is {said}" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("policy", "value", "said"),
+    [
+        ("depth", "-3", "-3: not a whole number of 1 ... 2147483647"),
+        ("depth", "0", "0: not a whole number"),
+        ("depth", "9999999999999", "9999999999999: not a whole number"),
+        ("depth", "1.5", "1.5: not a whole number"),
+        ("deadline", "-5", "-5: not a whole number of 0 ... "),
+        ("liveliness_lease_duration", "soon", "'soon': not a whole number"),
+        ("reliability", "perhaps", "'perhaps': there are .*best_effort"),
+        ("history", "unknown", "'unknown': there are .*keep_last"),
+        ("durability", "3", "3: there are .*volatile"),
+    ],
+)
+def test_an_override_that_cannot_be_is_told_before_the_middleware_does(
+    policy: str, value: str, said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    name = f"qos_overrides./{VALVE_COMMAND.name}.publisher.{policy}"
+    words = ["--ros-args", "-p", f"{name}:={value}"]
+    with _graph(), pytest.raises(ParameterError, match=f"^force_loop_node: {name} = {said}"):
+        ForceLoopNode(words)
+    assert capfd.readouterr().err == ""
+
+
 def test_an_override_may_be_given_to_nodes_without_the_topic() -> None:
     """As `/**` of a parameter file does; the topic's name is that in the nodes' namespace."""
     of = "qos_overrides./left/truth.publisher"

@@ -60,6 +60,7 @@ from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.run import main as run_graph
+from emir_ros.run_parameters import reaches
 
 DURATION = 4.8  # s: at rest, and into the plateau of the first move
 
@@ -270,6 +271,80 @@ def test_what_the_run_does_not_take_from_the_parameter_file_is_told(
     assert f"emir run: {parameters}: {said}\n" in capfd.readouterr().err
 
 
+def test_the_run_prevails_over_the_file_whatever_its_order(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """rcl would let a name that comes after the pattern /** prevail over the run's own."""
+    parameters, bag = tmp_path / "other.yaml", tmp_path / "run"
+    parameters.write_text(
+        "/**: {ros__parameters: {use_sim_time: false}}\n"
+        "plant_node: {ros__parameters: {lockstep: false, duration: 9.0}}\n"
+    )
+    assert run_graph(["--params", str(parameters), "--duration", "0.32", "--bag", str(bag)]) == 0
+    assert "the run sets it: plant_node: lockstep, duration" in capfd.readouterr().err
+    assert _read_with_rosbags(bag)["/truth"][-1][0] == 320_000_000
+
+
+def test_a_file_of_two_machines_sets_up_each_by_its_own_part(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    parameters = tmp_path / "two.yaml"
+    parameters.write_text(
+        "/left/cascade_node: {ros__parameters: {gain: 1.5}}\n"
+        "/left/trajectory_node: {ros__parameters: {trajectory: hold}}\n"
+        "/right/cascade_node: {ros__parameters: {gain: 1.0}}\n"
+        "/right/trajectory_node: {ros__parameters: {trajectory: lower-lift, speed: 0.02}}\n"
+        "/*/plant_node: {ros__parameters: {duration: 0.32}}\n"
+    )
+    told = {}
+    for side in ("left", "right"):
+        bag = tmp_path / side
+        words = ["--namespace", side, "--params", str(parameters), "--bag", str(bag)]
+        assert run_graph(words) == 0
+        set_up = yaml.safe_load(parameters_text(info(bag)))
+        told[side] = {node: entry["ros__parameters"] for node, entry in set_up.items()}
+    assert "of another namespace: /right/cascade_node, /right/traj" in capfd.readouterr().err
+    gains = {side: nodes["cascade_node"]["gain"] for side, nodes in told.items()}
+    assert gains == {"left": 1.5, "right": 1.0}
+    names = {side: nodes["trajectory_node"]["trajectory"] for side, nodes in told.items()}
+    assert names == {"left": "hold", "right": "lower-lift"}
+    assert told["left"]["trajectory_node"]["speed"] == TrajectoryParameters().speed
+    assert {nodes["plant_node"]["duration"] for nodes in told.values()} == {0.32}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "namespaces"),
+    [
+        ("x", {"", "a", "a/b"}),
+        ("/**/x", {"", "a", "a/b"}),
+        ("/**", {"", "a", "a/b"}),
+        ("/x", {""}),
+        ("/*/x", {"a"}),
+        ("a/x", {"a"}),
+        ("/a/**", {"a", "a/b"}),
+        ("/a/*", {"a"}),
+        ("/b/x", set()),
+        ("/**/y", set()),
+    ],
+)
+def test_a_pattern_reaches_whom_rcl_lets_it_reach(
+    pattern: str, namespaces: set[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "pattern.yaml"
+    as_rcl_takes_it = pattern if "/" in pattern else f"/**/{pattern}"
+    file.write_text(f"{as_rcl_takes_it}: {{ros__parameters: {{a: 1}}}}\n")
+    by_rcl = set()
+    rclpy.init()
+    for place in ("", "a", "a/b"):
+        words = ["--params-file", str(file), "-r", f"__ns:=/{place}"]
+        node = rclpy.create_node("x", cli_args=["--ros-args", *words])
+        by_rcl |= {place} if node._parameter_overrides else set()
+        node.destroy_node()
+    rclpy.shutdown()
+    ours = {place for place in ("", "a", "a/b") if reaches(pattern, "x", place)}
+    assert ours == by_rcl == namespaces
+
+
 def test_nodes_that_live_in_the_lock_steps_time_do_not_wait_for_it(tmp_path: Path) -> None:
     parameters, bag = tmp_path / "clock.yaml", tmp_path / "run"
     parameters.write_text("/**: {ros__parameters: {use_sim_time: true}}")
@@ -394,6 +469,12 @@ BAD = {
     "controller": (["--controller", "magic"], "", "controller 'magic': there are cascade"),
     "namespace": (["--namespace", "2nd"], "", "namespace '2nd': letters, digits"),
     "trajectory": (["--trajectory", "loop"], "", "trajectory 'loop': there are lift-lower"),
+    "no trajectory": (["--trajectory", ""], "", "trajectory '': there are lift-lower"),
+    "trajectory's speed": (
+        [],
+        "trajectory_node: {ros__parameters: {speed: 2e+2}}",
+        "trajectory_node: speed = 200: outside",
+    ),
     "duration": (["--duration", "-1"], "", "duration = -1 s: has to be positive"),
     "switch": (["--switch", "2=magic"], "", "controller 'magic': there are cascade"),
     "switch time": (["--switch", "soon=pfc"], "", "--switch soon=pfc: not of the form S=NAME"),
@@ -436,10 +517,30 @@ BAD = {
     ),
     "node": ([], "crane: {ros__parameters: {}}", "crane: no such node; there are"),
     "form": ([], "plant_node: {valve: 1}", "plant_node: ros__parameters is missing"),
+    "twice": (
+        [],
+        "plant_node: {ros__parameters: {valve: {dead_zone: 0.1}, valve.dead_zone: 0.2}}",
+        "plant_node: valve.dead_zone stands twice",
+    ),
+    "robot's file": (
+        [],
+        "/**: {ros__parameters: {model: robot}}\ntrajectory_node: {ros__parameters: {joint: 2}}",
+        "params.yaml: /**: for the model robot, and the run is of joint1: give --model robot",
+    ),
+    "unknown model": (
+        [],
+        "/**: {ros__parameters: {model: [crane]}}",
+        "params.yaml: /**: model ['crane']: there are joint1, robot",
+    ),
+    "right's gain": (
+        ["--namespace", "right"],
+        "/right/cascade_node: {ros__parameters: {gain: high}}",
+        "cascade_node: gain = 'high': not of type",
+    ),
     "angle": (
         [],
         "plant_node: {ros__parameters: {initial_angle: 0.0, supply: {p0: 5.0e6}}}",
-        "the boom needs",
+        "params.yaml: plant_node: at 0.0 deg the boom needs",
     ),
 }
 
@@ -499,7 +600,7 @@ def test_a_recording_says_what_it_was_made_with(processes: str, tmp_path: Path) 
         assert all(entry["meaning"] for entry in fields.values())
     again = tmp_path / "again.yaml"
     again.write_text(parameters_text(info(bag)))
-    assert read_parameters(again) == parameters
+    assert read_parameters(Plan(bag=bag, params=again)) == parameters
     words = ["--params", str(again), "--processes", processes, "--duration", "0.5"]
     assert run_graph([*words, "--bag", str(tmp_path / "again")]) == 0  # it sets up the same run
     assert _raw(tmp_path / "again") == _raw(bag)

@@ -31,6 +31,7 @@ from emir_analysis.robot_setup import (
 )
 from emir_analysis.run_signals import load_run
 from emir_analysis.stamped import same
+from emir_common.quantity import ParameterError
 from emir_control.cascade import Cascade
 from emir_control.trajectory import TrajectoryParameters
 from emir_msgs_py import conversions
@@ -92,6 +93,8 @@ def test_predictive_control_drives_the_robot_and_is_replayed(tmp_path: Path) -> 
     for node in ("trajectory", "pfc", "force_loop"):
         assert same(replay(bag, node, {})), node
     assert 0.1 < load_run(bag)["joint1_valve_command"].value[-1] < 0.6  # it lifts
+    with pytest.raises(ParameterError, match=r"^plant: joint 3: 85\.9 deg is outside"):
+        replay(bag, "plant", {"initial_angles.joint3": 1.5})
 
 
 def test_description_and_its_joints_are_published() -> None:
@@ -194,6 +197,11 @@ BAD = {
         [],
         "plant_node: {ros__parameters: {effects: {command_delay: {delay: 0.01}}}}",
         "effects.command_delay: not in the model of the whole robot",
+    ),
+    "too heavy": (
+        ["--trajectory", "hold"],
+        "plant_node: {ros__parameters: {supply.p0: 5.0e+6}}",
+        r"params.yaml: plant_node: joint \d needs \d+ bar to rest on, the pump gives 50",
     ),
     "file": (
         [],

@@ -133,15 +133,53 @@ def test_what_is_no_node_is_refused_in_one_line(words: list[str]) -> None:
     assert finished.stderr.count("\n") == 1
 
 
-def test_the_graph_told_to_stop_while_it_loads(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "who"), [("run", "emir run"), ("bench", "emir bench graph")])
+def test_the_graph_told_to_stop_while_it_loads(name: str, who: str, tmp_path: Path) -> None:
     slow = tmp_path / "numpy.py"  # in place of what it loads
     slow.write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
-    command = [sys.executable, "-m", "emir_ros.start", "run", "--bag", str(tmp_path / "bag")]
+    command = [sys.executable, "-m", "emir_ros.start", name]
     here = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
     finished = subprocess.run(
         command, capture_output=True, text=True, timeout=DEADLINE, check=False, env=here
     )
-    assert (finished.returncode, finished.stderr) == (130, "emir run: interrupted\n")
+    assert (finished.returncode, finished.stderr) == (130, f"{who}: interrupted\n")
+
+
+@pytest.mark.parametrize("when", ["after", "at the end of"])
+def test_a_measurement_is_stopped_also_between_its_runs(when: str, tmp_path: Path) -> None:
+    """The first run, in this process, hears of signals in its own way, to its end."""
+    raising = "lambda *_: signal.raise_signal(signal.SIGINT)"
+    script = (
+        "import signal, sys; from pathlib import Path; from emir_ros import bench, run, start\n"
+        f"if sys.argv[1] == 'after': then = {raising}\n"
+        f"else: run.take_the_rest = {raising}; then = lambda: print('went on')\n"
+        "plan = bench.Plan(bag=Path(sys.argv[2]), duration=0.1)\n"
+        "bench._parts = lambda _: iter([(bench._run(plan, 'one'), then())])\n"
+        "sys.argv[1:] = ['bench']; start.main()"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", script, when, str(tmp_path / "bag")],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE,
+        check=False,
+    )
+    assert finished.returncode == 130, finished.stderr
+    assert finished.stderr.splitlines()[-1] == "emir bench graph: interrupted"
+    assert "Traceback" not in finished.stderr
+    assert finished.stdout == ""
+
+
+@pytest.mark.parametrize("words", [["-p", "gain:=1.0"], ["--help"], ["gain:=1.0", "--ros-args"]])
+def test_what_no_node_knows_is_refused(words: list[str]) -> None:
+    """Such as parameters without --ros-args, which would not be set."""
+    command = [sys.executable, "-m", "emir_ros.start", "cascade_node", *words]
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
+    given = " ".join(word for word in words if word != "--ros-args")
+    said = f"cannot start: {given}: not known; parameters are given by --ros-args -p NAME:=VALUE\n"
+    assert (finished.returncode, finished.stderr) == (1, said)
 
 
 @pytest.mark.parametrize(

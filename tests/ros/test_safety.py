@@ -35,6 +35,7 @@ from emir_msgs_py.topics import (
     VELOCITY_COMMAND,
     Topic,
 )
+from emir_plant.plant import SimulationError
 from emir_ros import qos
 from emir_ros.cascade_node import CascadeNode
 from emir_ros.diagnostics import Level
@@ -283,6 +284,23 @@ def test_a_command_that_comes_twice_ends_a_run_in_lock_step() -> None:
         for _ in range(2):
             publisher.publish(conversions.message(VELOCITY_COMMAND, 0, {"velocity_command": 0.02}))
         with pytest.raises(NodeError, match=r"velocity_command came twice for t = 0\.000 s"):
+            graph.until(lambda: False, "nothing is said")
+
+
+def test_a_machine_that_fails_in_a_step_says_which_node_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with _graph(lambda: PlantNode(LOCKSTEP), lockstep=True) as graph:
+        plant = graph.nodes[1]
+        assert isinstance(plant, PlantNode)
+
+        def advance(_command: object, _dt: float) -> None:
+            raise SimulationError("the state is not finite")
+
+        monkeypatch.setattr(plant.machine, "step", advance)
+        publisher = graph.listener.publisher(VALVE_COMMAND)
+        publisher.publish(conversions.message(VALVE_COMMAND, 0, {"valve_command": 0.5}))
+        with pytest.raises(NodeError, match=r"^plant_node: the state is not finite$"):
             graph.until(lambda: False, "nothing is said")
 
 

@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import MISSING, asdict, fields
 from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from emir_analysis.blind.trial import Outcome, Plan, trial
+from emir_analysis.blind.plan import Plan
+from emir_analysis.blind.trial import Outcome, trial
 from emir_analysis.errors import InputError
 
 INTERRUPTED = 130  # exit code
@@ -43,7 +44,7 @@ def campaign(  # noqa: PLR0913 (who, what, where)
         progress(f"{log} has {machines - len(missing)} of {machines} machines")
     with log.open("a", encoding="utf-8") as lines:
         if not log.stat().st_size:
-            lines.write(_header(plan) + "\n")
+            lines.write(json.dumps(_described(plan)) + "\n")
         futures = [executor.submit(_work, plan, number, threads, keep) for number in missing]
         try:
             for future in as_completed(futures):
@@ -84,19 +85,25 @@ def read_log(log: Path, plan: Plan | None = None) -> list[Outcome]:
     if whole != text:
         log.write_text(whole, encoding="utf-8")
     lines = whole.splitlines()
-    if lines and plan is not None and lines[0] != _header(plan):
-        raise InputError(f"{log}: of another seed, duration, set or kind; choose another file")
     known = {field.name for field in fields(Outcome)}
     try:
+        if lines and plan is not None and not _is_of(plan, json.loads(lines[0])):
+            raise InputError(f"{log}: of another seed, duration, set or kind; choose another file")
         found = [json.loads(line) for line in lines[1:]]
         return [Outcome(**{k: v for k, v in entry.items() if k in known}) for entry in found]
     except (json.JSONDecodeError, TypeError) as error:
         raise InputError(f"{log}: not a log of blind machines: {error}") from None
 
 
-def _header(plan: Plan) -> str:
-    described = asdict(plan) | {"foreign": sha256(plan.foreign.encode()).hexdigest()[:12]}
-    return json.dumps(described)
+def _described(plan: Plan) -> dict[str, Any]:
+    source = sha256(plan.foreign.encode()).hexdigest()[:12]
+    return asdict(plan) | {"only": list(plan.only), "foreign": source}
+
+
+def _is_of(plan: Plan, described: dict[str, Any]) -> bool:
+    """Tell whether a log's first line describes a plan; what it does not know yet was not there."""
+    later = {field.name: field.default for field in fields(Plan) if field.default is not MISSING}
+    return later | described == _described(plan)
 
 
 def _work(plan: Plan, number: int, threads: int, keep: Path | None) -> Outcome:

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from emir_analysis.blind.campaign import campaign, workers
-from emir_analysis.blind.hidden import CATALOGUE
+from emir_analysis.blind.family import ACTUATOR, BOOM, Family, family
+from emir_analysis.blind.plan import Plan, foreign_effects
 from emir_analysis.blind.report import report
-from emir_analysis.blind.trial import Plan, foreign_effects
 from emir_analysis.errors import InputError
-
-SHORTEST = 20.0  # s
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
@@ -30,7 +28,13 @@ def arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--varied", action="store_true", help="each machine of another size, with other sensors"
     )
-    parser.add_argument("--duration", type=float, default=60.0, metavar="S", help="of a recording")
+    parser.add_argument(
+        "--actuator", action="store_true", help="machines that are not EMIR, in normalised units"
+    )
+    usual = " or ".join(f"{sort.usual:g} {sort.unit}" for sort in (BOOM, ACTUATOR))
+    parser.add_argument(
+        "--duration", type=float, metavar="D", help=f"of a recording; {usual} of an actuator"
+    )
     parser.add_argument(
         "--log", type=Path, metavar="FILE", help="one JSON line per machine; continued if there"
     )
@@ -40,15 +44,22 @@ def arguments(words: list[str]) -> argparse.Namespace:
 
 def command(options: argparse.Namespace, progress: Callable[[str], None]) -> str:
     """Run the blind test; return its report. Raises InputError for what cannot be used."""
-    source, only = _source(options.foreign), _only(options.only)
-    plan = Plan(options.seed, options.duration, source, only, options.varied)
-    foreign_effects(plan.foreign)
+    sort = family(actuator=options.actuator)
+    if options.actuator and options.varied:
+        raise InputError("--varied: every actuator is another one anyway; leave it out")
+    plan = Plan(
+        seed=options.seed,
+        duration=_duration(options.duration, sort),
+        foreign=_source(options.foreign),
+        only=_only(options.only, sort),
+        varied=options.varied,
+        actuator=options.actuator,
+    )
+    foreign_effects(plan.foreign, sort.base)
     if options.machines < 1:
         raise InputError(f"--machines {options.machines}: at least one")
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: not negative")
-    if not plan.duration >= SHORTEST:
-        raise InputError(f"--duration {plan.duration:g}: at least {SHORTEST:g} s")
     cores = os.cpu_count() or 1
     jobs = cores if options.jobs is None else options.jobs
     if jobs < 1:
@@ -71,9 +82,18 @@ def _source(file: Path | None) -> str:
         raise InputError(f"--foreign {file}: {error}") from None
 
 
-def _only(text: str) -> tuple[str, ...]:
+def _duration(wanted: float | None, sort: Family) -> float:
+    duration = sort.usual if wanted is None else wanted
+    if not duration >= sort.shortest:
+        raise InputError(f"--duration {duration:g}: at least {sort.shortest:g} {sort.unit}")
+    if sort is ACTUATOR and not duration.is_integer():
+        raise InputError(f"--duration {duration:g}: a whole number of {sort.unit}")
+    return duration
+
+
+def _only(text: str, sort: Family) -> tuple[str, ...]:
     names = tuple(name for name in text.split(",") if name)
-    known = {effect.name for effect in CATALOGUE}
+    known = {effect.name for effect in sort.catalogue}
     for name in names:
         if name not in known:
             raise InputError(f"--only {name}: there are {', '.join(sorted(known))}")

@@ -10,10 +10,10 @@ from emir_analysis.blind.machine import Array, Machine, Sizes
 from emir_analysis.blind.numbers import Numbers, Stated
 from emir_analysis.blind.operator import Operator
 from emir_analysis.blind.recording import SEEN_IN, Run, Start, operated, repeated, spread_of_strokes
+from emir_analysis.blind.turns import hidden_in, kind_of
 
 Effects = tuple[type[Hidden], ...]
 
-KINDS = ("one", "none", "one", "two", "one", "foreign")  # in turn
 MATTERS = 0.05  # of a signal's standard deviation: the least RMS that effects have to make
 STRONGER = 1.6  # times, where they make less
 ATTEMPTS = 4  # to make them matter, before others are drawn
@@ -54,7 +54,7 @@ def puzzle(  # noqa: PLR0913, PLR0917 (what a machine is made of, one by one)
     start = Start(random.uniform(0.7, 0.87), random.uniform(15e5, 35e5))
     machine, size, tried = None, 0.0, 0
     while machine is None:
-        effects = hidden_in(seed, number, foreign, only, tried)
+        effects = hidden_in(seed, number, CATALOGUE, foreign, only, tried)
         machine, size = _that_matters(effects, numbers, start, stated, random)
         tried += 1
     runs = [
@@ -63,35 +63,6 @@ def puzzle(  # noqa: PLR0913, PLR0917 (what a machine is made of, one by one)
     ]
     names = tuple(effect.name for effect in effects)
     return Puzzle(machine, kind_of(number, foreign), names, size, *runs)
-
-
-def kind_of(number: int, foreign: Effects) -> str:
-    """Return the kind of machine `number`."""
-    kind = KINDS[number % len(KINDS)]
-    return "none" if kind == "foreign" and not foreign else kind
-
-
-def hidden_in(
-    seed: int, number: int, foreign: Effects, only: tuple[str, ...] = (), tried: int = 0
-) -> Effects:
-    """Draw what is hidden in machine `number`; every effect has its turn before the next round.
-
-    tried: how often before it was drawn in vain.
-    """
-    kind = kind_of(number, foreign)
-    if kind == "none":
-        return ()
-    of_kind = foreign if kind == "foreign" else CATALOGUE
-    catalogue = tuple(e for e in of_kind if e.name in only) or of_kind
-    if kind == "two" or tried:
-        random = np.random.default_rng((seed, number, tried))
-        count = min(2 if kind == "two" else 1, len(catalogue))
-        drawn = random.choice(len(catalogue), count, replace=False)
-        return tuple(catalogue[k] for k in drawn)
-    turn = sum(KINDS[k % len(KINDS)] == kind for k in range(number))
-    turn_of_all, place = divmod(turn, len(catalogue))
-    order = np.random.default_rng((seed, KINDS.index(kind), turn_of_all))
-    return (catalogue[order.permutation(len(catalogue))[place]],)
 
 
 def _operator(random: Random, stated: Stated, *, abrupt: bool) -> Operator:

@@ -5,35 +5,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mcap_ros2.writer import Writer
 
 from emir_analysis.blind.machine import Array, Machine
+from emir_analysis.blind.mcap_file import Sampled, write_signals
 from emir_analysis.blind.numbers import Numbers
 from emir_analysis.blind.operator import RANGE, Operator
 
 Command = Callable[[float, Array], float]  # time, s, and state -> y2
 
-START = 1_700_000_000_000_000_000  # ns
 SEEN_IN = {  # signals of the signal map in which one of a run is seen
     "angle": {"joint_angle", "piston_stroke"},
     "pressure_lifting": {"pressure_lifting"},
     "pressure_lowering": {"pressure_lowering"},
     "deflection": {"tip_deflection_angle"},
 }
-_HEADER = """\
-std_msgs/Header header
-{fields}
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-_JOINT = "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort"
-_PRESSURE = "float64 fluid_pressure\nfloat64 variance"
 
 
 @dataclass(frozen=True)
@@ -122,34 +107,16 @@ def write(path: Path, run: Run, machine: Machine, random: np.random.Generator) -
     angle = np.round(run.shown["angle"] / step) * step
     pressure_noise = n.pressure_noise * random.standard_normal((2, size))
     gauge_noise = n.deflection_noise * random.standard_normal(size)
-    topics = {
-        "/joint_states": (sample, angle),
-        "/cylinder": (sample, machine.stated_stroke(angle)),
-        "/pressure_lifting": (sample, run.shown["pressure_lifting"] + pressure_noise[0]),
-        "/pressure_lowering": (sample, run.shown["pressure_lowering"] + pressure_noise[1]),
-        "/boom_deflection": (sample, run.shown["deflection"] + gauge_noise),
-        "/valve_command": (n.command_period, run.commands),
-    }
-    with path.open("wb") as stream, Writer(stream) as writer:
-        joint = writer.register_msgdef("sensor_msgs/msg/JointState", _HEADER.format(fields=_JOINT))
-        pressure = writer.register_msgdef(
-            "sensor_msgs/msg/FluidPressure", _HEADER.format(fields=_PRESSURE)
-        )
-        for topic, (period, values) in topics.items():
-            for k, value in enumerate(values.tolist()):
-                ns = START + round(k * period * 1e9)
-                stamp = {"sec": ns // 10**9, "nanosec": ns % 10**9}
-                header = {"stamp": stamp, "frame_id": ""}
-                if "pressure" in topic:
-                    message = {"header": header, "fluid_pressure": value, "variance": 0.0}
-                else:
-                    message = {
-                        "header": header,
-                        "name": ["joint"],
-                        "position": [value],
-                        "velocity": [],
-                        "effort": [],
-                    }
-                writer.write_message(
-                    topic, pressure if "pressure" in topic else joint, message, ns, ns
-                )
+    write_signals(
+        path,
+        {
+            "/joint_states": Sampled(sample, angle),
+            "/cylinder": Sampled(sample, machine.stated_stroke(angle)),
+            "/pressure_lifting": Sampled(sample, run.shown["pressure_lifting"] + pressure_noise[0]),
+            "/pressure_lowering": Sampled(
+                sample, run.shown["pressure_lowering"] + pressure_noise[1]
+            ),
+            "/boom_deflection": Sampled(sample, run.shown["deflection"] + gauge_noise),
+            "/valve_command": Sampled(n.command_period, run.commands),
+        },
+    )

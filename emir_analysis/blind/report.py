@@ -81,13 +81,13 @@ def _rates(outcomes: Sequence[Outcome]) -> str:
         share("healthy machine, false alarm", healthy,
               sum(o.verdict != "nothing_missing" for o in healthy)),
         share("foreign effect, unexplained", foreign, sum(map(right, foreign))),
-        share("  and measured as a curve, within twice the noise", foreign,
-              sum(map(_measured, foreign))),
+        share("  and yet modelled, within twice the noise", foreign,
+              sum(map(_modelled, foreign))),
     ]  # fmt: skip
     return "\n".join(line for line in lines if line)
 
 
-def _measured(o: Outcome) -> bool:
+def _modelled(o: Outcome) -> bool:
     """Tell whether the machine is explained though what it has got no name."""
     errors = o.errors.get("with_effect", {}).values()
     return right(o) and bool(errors) and max(errors) <= EXPLAINED

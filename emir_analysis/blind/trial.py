@@ -8,43 +8,14 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from emir_analysis.blind.hidden import Hidden
+from emir_analysis.blind.family import JUDGE, LEARN, SHEET, SIGNALS, Secret, family
 from emir_analysis.blind.machine import NotSolvedError
-from emir_analysis.blind.numbers import (
-    DATA_SHEET,
-    Stated,
-    data_sheet,
-    read_numbers,
-    signal_map,
-)
-from emir_analysis.blind.puzzle import Puzzle, kind_of, puzzle
-from emir_analysis.blind.recording import write
-from emir_analysis.blind.varied import varied
-from emir_analysis.errors import InputError
+from emir_analysis.blind.plan import Plan, foreign_effects
+from emir_analysis.blind.turns import kind_of
 
 PATIENCE = 3600.0  # s, for one diagnosis
-SHEET, SIGNALS = "datasheet.yaml", "signals.yaml"  # beside a machine's recordings
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What makes a blind test repeatable.
-
-    foreign: the source text of a module whose FOREIGN lists what no catalogue holds. duration:
-    of each of a machine's two recordings, s. only: effects from which to draw; all when empty.
-    varied: each machine is of a sheet of its own, with its own sampling and sensors.
-    """
-
-    seed: int
-    duration: float
-    foreign: str = ""
-    only: tuple[str, ...] = ()
-    varied: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,21 +40,6 @@ class Outcome:
     failure: str = ""
 
 
-def foreign_effects(source: str) -> tuple[type[Hidden], ...]:
-    """Return what a module's source text lists as FOREIGN. Raises InputError without that."""
-    if not source:
-        return ()
-    module = ModuleType("foreign")
-    try:
-        exec(source, module.__dict__)  # noqa: S102 (the user's own file, sent to the workers)
-    except Exception as error:  # noqa: BLE001 (whatever that file does)
-        raise InputError(f"the foreign effects' file: {error}") from None
-    found = getattr(module, "FOREIGN", None)
-    if not isinstance(found, tuple) or not found:
-        raise InputError("the foreign effects' file has no tuple FOREIGN")
-    return found
-
-
 def trial(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Outcome:
     """Build machine `number`, record it and have it diagnosed with so many threads.
 
@@ -98,28 +54,15 @@ def trial(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Ou
 
 
 def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
-    foreign = foreign_effects(plan.foreign)
-    stated = _stated(plan, number)
-    (folder / SHEET).write_text(data_sheet(stated), encoding="utf-8")
-    (folder / SIGNALS).write_text(signal_map(stated.missing), encoding="utf-8")
+    sort = family(actuator=plan.actuator)
     try:
-        made = puzzle(stated, plan.seed, number, foreign, plan.duration, plan.only)
+        secret = sort.made(plan, number, folder)
     except NotSolvedError as error:
-        return _without_answer(number, kind_of(number, foreign), f"not made: {error}")
-    noise = np.random.default_rng((plan.seed, number, 1))
-    for name, run in (("a", made.learn), ("b", made.judge)):
-        write(folder / f"{name}.mcap", run, made.machine, noise)
+        kind = kind_of(number, foreign_effects(plan.foreign, sort.base))
+        return _without_answer(number, kind, f"not made: {error}")
     begin = time.monotonic()
     answer, failure = _diagnosed(folder, threads)
-    return _outcome(made, number, answer, failure, time.monotonic() - begin)
-
-
-def _stated(plan: Plan, number: int) -> Stated:
-    """Return what the maker says of a machine."""
-    stated = read_numbers(DATA_SHEET)
-    if not plan.varied:
-        return stated
-    return varied(stated, np.random.default_rng((plan.seed, number, 2)))
+    return _outcome(secret, number, answer, failure, time.monotonic() - begin)
 
 
 def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:
@@ -127,9 +70,9 @@ def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:
     answer = folder / "answer.json"
     result = subprocess.run(  # noqa: S603 (the project's own command)
         [
-            *(sys.executable, "-m", "emir_analysis.cli", "diagnose", str(folder / "a.mcap")),
+            *(sys.executable, "-m", "emir_analysis.cli", "diagnose", str(folder / LEARN)),
             *("--datasheet", str(folder / SHEET), "--signals", str(folder / SIGNALS)),
-            *("--judge", str(folder / "b.mcap"), "--json", str(answer)),
+            *("--judge", str(folder / JUDGE), "--json", str(answer)),
         ],
         capture_output=True,
         text=True,
@@ -144,16 +87,16 @@ def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:
 
 
 def _outcome(
-    made: Puzzle, number: int, answer: dict[str, Any], failure: str, seconds: float
+    secret: Secret, number: int, answer: dict[str, Any], failure: str, seconds: float
 ) -> Outcome:
     signals = answer.get("signals", {})
     stages = ("nominal", "refitted", "with_effect")
     return Outcome(
         machine=number,
-        kind=made.kind,
-        hidden=list(made.hidden),
-        sizes=made.machine.sizes,
-        size=made.size,
+        kind=secret.kind,
+        hidden=list(secret.hidden),
+        sizes=secret.sizes,
+        size=secret.size,
         verdict=answer.get("verdict", "failed"),
         named=[effect["name"] for effect in answer.get("effects", [])],
         rivals=[str(rival) for rival in answer.get("rivals", [])],

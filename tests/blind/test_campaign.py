@@ -10,7 +10,7 @@ import pytest
 from emir_analysis.blind import campaign as campaigns
 from emir_analysis.blind import puzzle as puzzles
 from emir_analysis.blind.campaign import campaign, workers
-from emir_analysis.blind.hidden import CATALOGUE
+from emir_analysis.blind.hidden import CATALOGUE, Hidden
 from emir_analysis.blind.numbers import (
     DATA_SHEET,
     SIGNAL_MAP,
@@ -18,10 +18,12 @@ from emir_analysis.blind.numbers import (
     read_numbers,
     signal_map,
 )
-from emir_analysis.blind.puzzle import KINDS, MATTERS, difference, hidden_in, puzzle
+from emir_analysis.blind.plan import Plan, foreign_effects
+from emir_analysis.blind.puzzle import MATTERS, difference, puzzle
 from emir_analysis.blind.recording import SEEN_IN, Run
 from emir_analysis.blind.report import report
-from emir_analysis.blind.trial import Outcome, Plan, foreign_effects
+from emir_analysis.blind.trial import Outcome
+from emir_analysis.blind.turns import KINDS, hidden_in
 from emir_analysis.blind.varied import varied
 from emir_analysis.cli import main
 from emir_analysis.errors import InputError
@@ -55,7 +57,7 @@ def no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_catalogue_is_all_of_the_registry() -> None:
     assert {effect.name for effect in CATALOGUE} == REGISTRY.keys()
-    assert not {effect.name for effect in foreign_effects(FOREIGN)} & REGISTRY.keys()
+    assert not {effect.name for effect in foreign_effects(FOREIGN, Hidden)} & REGISTRY.keys()
 
 
 def test_every_effect_has_its_turn() -> None:
@@ -193,7 +195,7 @@ def test_figures_mean_what_they_say() -> None:
     assert "an effect of the catalogue called nothing 1 of 5" in lines
     assert "healthy machine, false alarm 1 of 2" in lines
     assert "foreign effect, unexplained 2 of 3" in lines
-    assert "and measured as a curve, within twice the noise 2 of 3" in lines
+    assert "and yet modelled, within twice the noise 2 of 3" in lines
     assert "piston_stroke 3.00 (3.00) 2.00 (2.00) 1.00 (1.00)" in lines
     assert "every signal within 1.1 times the noise: 2 of 2" in lines
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emir_analysis.blind.puzzle import KINDS
-from emir_analysis.blind.trial import Plan, trial
+from emir_analysis.blind.plan import Plan
+from emir_analysis.blind.trial import trial
+from emir_analysis.blind.turns import KINDS
 from emir_analysis.cli import main
 
 HERE = Path(__file__).parent

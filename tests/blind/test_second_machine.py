@@ -15,8 +15,8 @@ from emir_analysis.blind import hidden
 from emir_analysis.blind.boom import boom
 from emir_analysis.blind.machine import Machine
 from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
+from emir_analysis.blind.plan import foreign_effects
 from emir_analysis.blind.recording import Run, Start, repeated
-from emir_analysis.blind.trial import foreign_effects
 from emir_common.parameter_tree import with_values
 from emir_plant.boom import boom_modes
 from emir_plant.plant import Plant
@@ -65,8 +65,9 @@ def apart(run: Run, other: dict[str, hidden.Array]) -> dict[str, float]:
 
 def test_what_is_judged_has_no_share_in_the_question() -> None:
     folder = Path(emir_analysis.blind.__file__).parent
-    files = list(folder.glob("*.py"))
+    files = list(folder.rglob("*.py"))
     assert folder / "machine.py" in files
+    assert folder / "actuator" / "machine.py" in files
     for file in files:
         for node in ast.walk(ast.parse(file.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
@@ -158,7 +159,7 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
 }
 
 
-_OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text())
+_OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text(), hidden.Hidden)
 _OTHER = {kind.name: kind for kind in _OTHERS}
 FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
     _OTHER["sensor_delay~dead time"]: (
@@ -243,7 +244,7 @@ def test_any_two_effects_go_together_in_either_order() -> None:
 )
 def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
     source = (Path(__file__).parent / file).read_text()
-    for effect in foreign_effects(source):
+    for effect in foreign_effects(source, hidden.Hidden):
         machine = effect(STATED, effect.drawn(np.random.default_rng(1), STATED))
         x = machine.start(START.angle, START.p_s)
         rates = machine.rates(x, 0.0, 0.0)

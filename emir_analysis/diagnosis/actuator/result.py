@@ -56,6 +56,7 @@ class CandidateResult:
 class ActuatorDiagnosis:
     """What the model of an actuator lacks.
 
+    rivals: sets of effects that would do as well, "a + b", where the verdict is ambiguous.
     signals: over the judge recording; one_step: one sample ahead of the measured pressure.
     spread: standard deviation of the judged pressure.
     """
@@ -63,6 +64,7 @@ class ActuatorDiagnosis:
     verdict: str
     statement: str
     effects: tuple[EffectResult, ...]
+    rivals: tuple[str, ...]
     candidates: tuple[CandidateResult, ...]
     balances: dict[str, BalanceResult]
     signals: dict[str, SignalResult]
@@ -158,6 +160,7 @@ def diagnosis(
         effects=tuple(_effect(name, fitted) for name in chosen.effects)
         if verdict in ("found", "ambiguous")
         else (),
+        rivals=tuple(" + ".join(r.effects) for r in found.rivals if verdict == "ambiguous"),
         candidates=tuple(
             CandidateResult(
                 f.name, 2.0 * (f.evidence - found.plain.evidence), found.unseen.get(f.name)

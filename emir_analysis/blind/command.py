@@ -10,6 +10,7 @@ from emir_analysis.blind.family import ACTUATOR, BOOM, Family, family
 from emir_analysis.blind.plan import Plan, foreign_effects
 from emir_analysis.blind.report import report
 from emir_analysis.errors import InputError
+from emir_analysis.outputs import check_outputs, written
 
 
 def arguments(words: list[str]) -> argparse.Namespace:
@@ -65,6 +66,10 @@ def command(options: argparse.Namespace, progress: Callable[[str], None]) -> str
     if jobs < 1:
         raise InputError(f"--jobs {jobs}: at least one")
     log = options.log or Path(f"blind-{plan.seed}.jsonl")
+    check_outputs([log], None, [options.foreign])
+    if options.keep is not None:
+        with written(options.keep):
+            options.keep.mkdir(parents=True, exist_ok=True)
     threads = 1 if options.scheduler else max(1, cores // jobs)
     with workers(jobs, options.scheduler) as executor:
         outcomes = campaign(

@@ -221,6 +221,8 @@ def test_machines_may_have_different_sensors() -> None:
         (["--foreign", "nowhere.py"], "nowhere.py"),
         (["--foreign", str(DATA_SHEET)], "foreign effects' file"),
         (["--scheduler", "127.0.0.1:1"], "--scheduler 127.0.0.1:1"),
+        (["--log", "nowhere/log.jsonl"], "nowhere/log.jsonl: no such folder"),
+        (["--keep", str(DATA_SHEET)], f"{DATA_SHEET}: File exists"),
     ],
 )
 def test_what_cannot_be_used_is_told_in_a_line(

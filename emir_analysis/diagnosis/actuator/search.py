@@ -1,12 +1,12 @@
 """Which effects an actuator has: chosen by the evidence of the recording for each set of them."""
 
 import math
-import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numba
 import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error
@@ -139,6 +139,6 @@ def _unseen(
 
 
 def _each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:
-    """Return the fit of each thing, fitted side by side on all cores."""
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    """Return the fit of each thing, fitted side by side on as many cores as numba may use."""
+    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
         return list(threads.map(fitted, things))

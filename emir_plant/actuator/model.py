@@ -27,6 +27,7 @@ from emir_plant.jit import compiled_for_threads, compiled_in_place
 Array = NDArray[np.float64]
 
 STEPS = 2  # of the integration between two samples, at least
+SWITCHING = 8  # times as many where a load-holding valve may switch
 RESOLVED = 2.0  # of the fastest rate times a step; RK4 is stable up to 2.8
 STATES = 8
 SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
@@ -148,6 +149,14 @@ def _share(flow: float, p: Any) -> float:
 
 
 @compiled_in_place
+def _switches(spool: float, command: float, p: Any) -> bool:
+    """Tell whether a load-holding valve may open or shut before the spool is at a command."""
+    if p.effects_load_holding_valve_line == 0.0:
+        return False
+    return (_flow(spool, 0.0, p) > 0.0) != (_flow(command, 0.0, p) > 0.0)
+
+
+@compiled_in_place
 def _steps(p: Any, period: float) -> int:
     """Return the steps between two samples that resolve what is fastest on the oil."""
     fastest = 0.0
@@ -261,8 +270,7 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
     """
     x, y, a, b, c, d = work[0], work[1], work[2], work[3], work[4], work[5]
     free = measured.size == 0
-    steps = _steps(p, period)
-    h = period / steps
+    usual = _steps(p, period)
     lag = p.effects_command_delay_delay / period
     play = p.effects_valve_hysteresis_play
     line = p.effects_line_resistance_coefficient
@@ -274,6 +282,10 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
         seen = _loss(_flow(x[SPOOL], now, p), line)
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
+        steps = usual
+        if _switches(x[SPOOL], _dragged(held, _at(command, k + 1 - lag), play), p):
+            steps *= SWITCHING
+        h = period / steps
         for j in range(steps):
             begin, middle, end = k + j / steps, k + (j + 0.5) / steps, k + (j + 1) / steps
             first = held

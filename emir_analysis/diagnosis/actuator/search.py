@@ -93,9 +93,11 @@ def _first(fits: Iterable[Fitted], count: int) -> list[Fitted]:
 def _probable(fitted: Fitted) -> float:
     """Return the logarithm of how probable a set is, but for a constant.
 
-    Before anything is measured one effect of all is expected in a machine.
+    Before anything is measured any number of effects is as probable as another, and so is any
+    set of that number: the more there are to choose from, the less each of them (Scott and Berger
+    2010, Annals of Statistics 38, 2587).
     """
-    return fitted.evidence - len(fitted.effects) * math.log(len(REGISTRY) - 1)
+    return fitted.evidence - math.log(math.comb(len(REGISTRY), len(fitted.effects)))
 
 
 def _neighbours(

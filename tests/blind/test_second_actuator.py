@@ -26,7 +26,11 @@ SHEET = plant.parameters.Actuator(
 OPENING = moves(300, np.random.default_rng(3))
 FINER = 10  # times shorter steps of the project's RK4: what is compared is the equations
 SAME_LAW = 3e-3  # of what an effect makes; most differ by 1e-4, the check valve by 1.5e-3
-FOREIGN = foreign_effects((Path(__file__).parent / "foreign_actuator.py").read_text(), Hidden)
+SOURCES = [
+    (Path(__file__).parent / name).read_text()
+    for name in ("foreign_actuator.py", "foreign_actuator_more.py")
+]
+FOREIGN = [effect for source in SOURCES for effect in foreign_effects(source, Hidden)]
 
 # sizes here, and the same in the registry
 SAME: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
@@ -112,6 +116,7 @@ def test_the_catalogue_is_all_of_the_registry_and_nothing_foreign() -> None:
     assert names == plant.REGISTRY.keys()
     assert set(hidden.CATALOGUE) == SAME.keys()
     assert not {effect.name for effect in FOREIGN} & names
+    assert len({effect.name for effect in FOREIGN}) == len(FOREIGN)
 
 
 def test_any_two_effects_go_together_in_either_order() -> None:
@@ -145,7 +150,8 @@ def test_foreign_effects_run_and_change_something(effect: type[Hidden]) -> None:
     assert max(apart) > 0.05
 
 
-def test_foreign_effects_know_neither_the_plant_nor_the_diagnosis() -> None:
-    for node in ast.walk(ast.parse((Path(__file__).parent / "foreign_actuator.py").read_text())):
+@pytest.mark.parametrize("source", SOURCES, ids=["first", "more"])
+def test_foreign_effects_know_neither_the_plant_nor_the_diagnosis(source: str) -> None:
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom):
             assert not str(node.module).startswith(("emir_plant", "emir_analysis.diagnosis"))

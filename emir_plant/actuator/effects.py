@@ -1,14 +1,21 @@
 """What an actuator may have beyond valve, oil and mass, in normalised units.
 
-`Effects` is the registry: each field is off by default, a search tries them all. Names are those
-of the boom's effects where the physics is the same. A flow counts as lifting where it raises the
-pressure. The terms stand in `model.py`.
+`REGISTRY` has those that have a name: each is off by default, a search tries them all. Names are
+those of the boom's effects where the physics is the same. A flow counts as lifting where it raises
+the pressure. The terms stand in `model.py`.
 """
 
 from dataclasses import dataclass
 from typing import ClassVar, get_type_hints
 
 from emir_common.quantity import quantity
+from emir_plant.actuator.unnamed import (
+    CURVES,
+    UnnamedFlow,
+    UnnamedForce,
+    UnnamedFriction,
+    UnnamedLeakage,
+)
 from emir_plant.effects.base import Balance, Effect
 
 OF_ORDER_ONE = "signals are scaled to the order of one, and so is what makes them"
@@ -245,6 +252,11 @@ class Effects:
     external_load: ExternalLoad = ExternalLoad()
     elastic_boom: ElasticBoom = ElasticBoom()
     swinging_load: SwingingLoad = SwingingLoad()
+    unnamed_flow: UnnamedFlow = UnnamedFlow()
+    unnamed_leakage: UnnamedLeakage = UnnamedLeakage()
+    unnamed_friction: UnnamedFriction = UnnamedFriction()
+    unnamed_force: UnnamedForce = UnnamedForce()
 
 
-REGISTRY: dict[str, type[Effect]] = get_type_hints(Effects)
+KNOWN: dict[str, type[Effect]] = get_type_hints(Effects)
+REGISTRY = {name: kind for name, kind in KNOWN.items() if name not in CURVES}

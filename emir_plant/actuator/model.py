@@ -21,6 +21,12 @@ from numpy.typing import NDArray
 
 from emir_common.parameter_tree import declared
 from emir_plant.actuator.parameters import Actuator
+from emir_plant.actuator.unnamed import (
+    unnamed_flow,
+    unnamed_force,
+    unnamed_friction,
+    unnamed_leakage,
+)
 from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled_for_threads, compiled_in_place
 
@@ -80,6 +86,11 @@ def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -
     What the transducer sees of a line's loss is part of the integral.
     """
     return np.asarray(_run_each(record(actuator), command, pressure, period, 0.0)[0, :, 1])
+
+
+def way(actuator: Actuator, command: Array, pressure: Array, period: float) -> Array:
+    """Return how far the piston has moved (n,) under the measured pressure (n,), as a volume."""
+    return np.asarray(_run_each(record(actuator), command, pressure, period, 0.0)[0, :, 2])
 
 
 def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
@@ -185,15 +196,17 @@ def _light_piston(pressure: float, damper: float, p: Any) -> float:
 @compiled_in_place
 def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
     """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
-    flow = _flow(x[SPOOL], pressure, p)
+    flow = _flow(x[SPOOL], pressure, p) + unnamed_flow(x[SPOOL], p)
     relief = 0.0
     if p.effects_relief_valve_high > 0.0:
         relief += RELIEF * max(pressure - p.effects_relief_valve_high, 0.0)
     if p.effects_relief_valve_low > 0.0:
         relief -= RELIEF * max(-pressure - p.effects_relief_valve_low, 0.0)
     leakage = p.effects_internal_leakage_conductance * pressure + relief
+    leakage += unnamed_leakage(pressure, p)
     mass = p.load_frequency * p.load_frequency
     load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
+    load -= unnamed_force(x[WAY], p)
     if p.effects_elastic_boom_compliance > 0.0:
         damper = _damper(p)
         spring = _spring_force(x[ARM_WAY], p)
@@ -205,7 +218,8 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     else:
         velocity = x[VELOCITY]
         carrier = velocity
-        slope[VELOCITY] = mass * (pressure - load - _friction(velocity, p))
+        resisting = _friction(velocity, p) + unnamed_friction(velocity, p)
+        slope[VELOCITY] = mass * (pressure - load - resisting)
         slope[ARM] = 0.0
         slope[ARM_WAY] = 0.0
     swing = p.effects_swinging_load_frequency
@@ -263,7 +277,7 @@ def _ahead(x: Any, step: float, slope: Any, y: Any) -> None:
 def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them in)
     p: Any, command: Any, measured: Any, period: float, start: float, work: Any, shown: Any
 ) -> None:
-    """Write measured pressure and the integral of its modelled rate, (n, 2), by RK4 steps.
+    """Write measured pressure, the integral of its modelled rate and the way, (n, 3), by RK4.
 
     measured: pressure that goes into every term, or nothing: then the simulated one does.
     work: (6, STATES) of zeros.
@@ -282,6 +296,7 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
         seen = _loss(_flow(x[SPOOL], now, p), line)
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
+        shown[k, 2] = x[WAY]
         steps = usual
         if _switches(x[SPOOL], _dragged(held, _at(command, k + 1 - lag), play), p):
             steps *= SWITCHING
@@ -302,7 +317,7 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
                 x[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
         if not abs(x[PRESSURE]) < NOWHERE:
             for later in range(k + 1, command.size):
-                shown[later, 0] = shown[later, 1] = NOWHERE
+                shown[later, 0] = shown[later, 1] = shown[later, 2] = NOWHERE
             break
 
 
@@ -310,9 +325,9 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
 def _run_each(
     parameters: NDArray[Any], command: Array, measured: Array, period: float, start: float
 ) -> Array:
-    """Return what `_write_run` writes for each of (m,) records, (m, n, 2)."""
+    """Return what `_write_run` writes for each of (m,) records, (m, n, 3)."""
     machines = parameters.size
-    work, shown = np.zeros((machines, 6, STATES)), np.empty((machines, command.size, 2))
+    work, shown = np.zeros((machines, 6, STATES)), np.empty((machines, command.size, 3))
     for m in range(machines):
         _write_run(parameters[m], command, measured, period, start, work[m], shown[m])
     return shown

@@ -18,7 +18,7 @@ import yaml
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_common.yaml_file import read_map
-from emir_plant.actuator.effects import REGISTRY
+from emir_plant.actuator.effects import KNOWN
 from emir_plant.actuator.parameters import Actuator, Load, Valve
 
 MACHINE = "actuator"
@@ -112,7 +112,7 @@ def _entries(content: dict[Any, Any]) -> dict[str, dict[str, Any]]:
     if not isinstance(effects, dict):
         raise ParameterError(f"effects = {effects!r}: not a map of effects by name")
     for name, members in effects.items():
-        if name not in REGISTRY:
+        if name not in KNOWN:
             raise ParameterError(f"effects.{name}: there is no such effect of an actuator")
         groups[f"effects.{name}"] = members
     found = {}

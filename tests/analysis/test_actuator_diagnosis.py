@@ -122,13 +122,24 @@ def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
     assert (valve.high, valve.low) == pytest.approx((0.4, 0.6), rel=0.02)
 
 
-def test_a_law_that_no_effect_has_is_unexplained(folder: Path) -> None:
+def test_a_law_that_no_effect_has_is_unexplained_and_measured(folder: Path) -> None:
     """Edges whose opening grows with its square: what comes closest is told, not named."""
     bag, judge = recorded.record(folder, lambda spool, _: 2.0 * spool * abs(spool))
     result = _diagnose(folder, bag, judge)
     assert result.verdict == "unexplained", summary(result)
     assert result.effects == ()
     assert "comes closest" in result.statement
+    assert "a flow over the valve opening" in result.statement
+    curve = result.curve
+    assert curve is not None
+    assert (curve.name, curve.balance) == ("unnamed_flow", "valve")
+    machine = load_actuator(folder / "model.yaml").machine
+    opening, more = np.array(curve.points).T
+    law = 2.0 * opening * np.abs(opening)
+    assert machine.valve.gain * opening + more == pytest.approx(law, abs=0.1 * law.max())
+    signal = result.signals["oil_pressure"]
+    assert signal.with_effect < 2.0 * recorded.NOISE < 0.2 * signal.refitted
+    assert (folder / "found.html").read_text().count("<img") == 2
 
 
 def test_what_the_judge_recording_alone_shows_is_told(folder: Path) -> None:

@@ -19,6 +19,7 @@ from emir_plant.actuator import (
 )
 from emir_plant.actuator.model import driven
 from emir_plant.actuator.parameters import Load, Valve
+from emir_plant.actuator.unnamed import PLACES
 
 PLAIN = Actuator(Valve(gain=1.5, time_constant=2.0), Load(frequency=0.3, viscous_friction=0.4))
 TIME = np.arange(300.0)
@@ -90,6 +91,26 @@ def test_effects_are_off_at_zero_and_change_something_when_on(effect: str) -> No
     on = simulate(_with(effect, **small.get(effect, {})), OPENING, 1.0)
     assert np.all(np.isfinite(on))
     assert np.abs(on - plain).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("curve", "slope", "named"),
+    [
+        ("unnamed_flow", 0.5, {"valve.gain": 2.0}),
+        ("unnamed_leakage", 0.05, {"effects.internal_leakage.conductance": 0.05}),
+        ("unnamed_friction", 0.2, {"load.viscous_friction": 0.6}),
+        ("unnamed_force", -0.01, {"effects.external_load.gradient": 0.01}),
+    ],
+)
+def test_a_straight_curve_is_what_has_a_name(
+    curve: str, slope: float, named: dict[str, float]
+) -> None:
+    places = np.linspace(-100.0, 100.0, PLACES)
+    values = {f"at_{k}": float(slope * place) for k, place in enumerate(places)}
+    ends = {"low": -100.0, "high": 100.0}
+    machine = with_values(PLAIN, {f"effects.{curve}.{k}": v for k, v in (values | ends).items()})
+    expected = simulate(with_values(PLAIN, named), OPENING, 1.0)
+    np.testing.assert_allclose(simulate(machine, OPENING, 1.0), expected, atol=1e-9)
 
 
 def test_a_flow_limit_limits_the_steady_velocity_and_so_the_pressure() -> None:

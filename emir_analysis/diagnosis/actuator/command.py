@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from emir_analysis.diagnosis.actuator.curves import measured
 from emir_analysis.diagnosis.actuator.page import write_page
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, open_record
 from emir_analysis.diagnosis.actuator.result import (
@@ -13,6 +14,7 @@ from emir_analysis.diagnosis.actuator.result import (
     stages,
 )
 from emir_analysis.diagnosis.actuator.search import Progress, search
+from emir_analysis.diagnosis.actuator.verdict import verdict
 from emir_analysis.diagnosis.result import write_json
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.import_command import write_signals
@@ -50,10 +52,14 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     signal_map = read_signal_map(signals)
     progress(f"reading {bag}")
     record = open_record(bag, signal_map)
-    found = search(sheet, record, noise_floor(sheet, record), progress)
+    noise = noise_floor(sheet, record)
+    found = search(sheet, record, noise, progress)
+    if verdict(sheet, found, noise) == "unexplained":
+        progress("measuring what has no name")
+        found = replace(found, curve=measured(sheet, found, record, noise))
     machines = stages(sheet, found)
     # frozen before the judge is opened
-    as_found = replace(sheet, machine=found.chosen.machine)
+    as_found = replace(sheet, machine=machines["with_effect"])
     failed = write_all([(model_out, lambda file: write_actuator(file, as_found))])
     judged = None
     if judge is not None:

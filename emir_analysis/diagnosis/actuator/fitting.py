@@ -19,7 +19,8 @@ from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
-from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet, simulate
+from emir_plant.actuator import Actuator, ActuatorSheet, simulate
+from emir_plant.actuator.effects import KNOWN
 from emir_plant.actuator.model import field, run_each
 from emir_plant.actuator.model import record as flat_record
 
@@ -98,8 +99,10 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
         for path, (low, high) in sheet.ranges.items()
     ]
     for effect in effects:
-        kind = REGISTRY[effect]
+        kind = KNOWN[effect]
         for name, about in quantities(kind).items():
+            if name not in kind.trial:
+                continue  # a curve's places: known
             path = f"effects.{effect}.{name}"
             found.append(_unknown(path, about.unit, kind.trial[name], about.low, about.high))
     return tuple(found)
@@ -140,7 +143,7 @@ class _Surplus:
         for place, member, column in zip(self._places, self.members, points.T, strict=True):
             machines[place] = [member.value(float(x)) for x in column]
         r = self._record
-        simulated = run_each(machines, r.opening, r.period, float(r.pressure[0]))
+        simulated = run_each(machines, r.opening, r.period, r.start)
         return np.asarray(simulated[:, self._part] - self._measured)
 
     def rms(self, x: Array) -> float:
@@ -256,8 +259,8 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
 
 
 def free_run(machine: Actuator, record: ActuatorRecord) -> Array:
-    """Return the simulated pressure (n,), from standstill at the first measured pressure."""
-    return simulate(machine, record.opening, record.period, float(record.pressure[0]))
+    """Return the simulated pressure (n,), from standstill at the measured pressure."""
+    return simulate(machine, record.opening, record.period, record.start)
 
 
 def free_run_error(machine: Actuator, record: ActuatorRecord) -> Array:
@@ -310,4 +313,4 @@ def _place(members: Sequence[Unknown], known: Actuator, level: float = 1.0) -> A
 
 def _trial(path: str) -> float:
     _, effect, name = path.split(".")
-    return REGISTRY[effect].trial[name]
+    return KNOWN[effect].trial[name]

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
 from emir_analysis.diagnosis.actuator.result import LABELS, ActuatorDiagnosis
 from emir_analysis.diagnosis.page import error_tests
@@ -25,21 +27,12 @@ def write_page(
     balance_rows = [
         (name, b.noise, b.before, b.refitted, b.after) for name, b in result.balances.items()
     ]
-    rows = [
-        (e.name, e.balance, name, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
-        for e in result.effects
-        for name, p in e.parameters.items()
-    ]
     closest = result.candidates[:SHOWN]
     blocks: list[Block] = [
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
-        Table(
-            ("effect", "balance", "parameter", "value", "low", "high", "unit"),
-            rows,
-            "low, high: two standard deviations from the curvature of the fit. Flows are in units"
-            " of the pressure rate that they make, velocities in units of flow.",
-        ),
+        *_effects(result),
+        *(_curve(result.curve) if result.curve else []),
         Heading(f"Free run on {Path(result.judged_on).name}"),
         Table(
             ("", "RMS error", "share of the spread"),
@@ -84,22 +77,59 @@ def write_page(
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
 
 
+def _effects(result: ActuatorDiagnosis) -> list[Block]:
+    rows = [
+        (e.name, e.balance, name, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
+        for e in result.effects
+        for name, p in e.parameters.items()
+    ]
+    about = (
+        "low, high: two standard deviations from the curvature of the fit. Flows are in units of"
+        " the pressure rate that they make, velocities in units of flow."
+    )
+    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit")
+    return [Table(columns, rows, about)] if rows else []
+
+
+def _curve(curve: CurveResult) -> list[Block]:
+    figure = new_figure(3.2)
+    ax = figure.subplots()
+    ax.plot(*zip(*curve.points, strict=True), color=COLOURS["with_effect"], marker="o")
+    ax.set_xlabel(curve.over)
+    ax.set_ylabel(f"{curve.what} that the model lacks")
+    _plain(ax)
+    return [
+        Heading(f"What has no name: a {curve.what} over the {curve.over}"),
+        Picture(
+            figure,
+            f"Fitted to the free run with the parameters; {curve.left:.3g} is left. It belongs to"
+            f" the balance of: {curve.balance}.",
+        ),
+        Table((curve.over, curve.what), curve.points, ""),
+    ]
+
+
+def _plain(ax: Axes) -> None:
+    ax.grid(color="#dfe4e9", lw=0.6)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
 def _picture(judged: ActuatorRecord, runs: dict[str, Array], time_unit: str) -> Figure:
     figure = new_figure(7.0)
+    time = judged.time - judged.begin
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 3, 2))
-    above.plot(judged.time, judged.opening, color=MEASURED, lw=0.9)
+    above.plot(time, judged.opening, color=MEASURED, lw=0.9)
     above.set_ylabel(OPENING.replace("_", " "))
     limit = 2.0 * abs(judged.pressure).max()
     for name, colour in COLOURS.items():
         shown = runs[name].clip(-limit, limit)
-        middle.plot(judged.time, shown, color=colour, lw=1.0, label=LABELS[name])
-        below.plot(judged.time, shown - judged.pressure, color=colour, lw=0.8)
-    middle.plot(judged.time, judged.pressure, color=MEASURED, lw=1.0, ls="--", label="measured")
+        middle.plot(time, shown, color=colour, lw=1.0, label=LABELS[name])
+        below.plot(time, shown - judged.pressure, color=colour, lw=0.8)
+    middle.plot(time, judged.pressure, color=MEASURED, lw=1.0, ls="--", label="measured")
     middle.set_ylabel(PRESSURE.replace("_", " "))
     middle.legend(ncols=5, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     below.set_ylabel("error")
-    below.set_xlabel(f"time, {time_unit}")
+    below.set_xlabel(f"time from the beginning of this recording, {time_unit}")
     for ax in (above, middle, below):
-        ax.grid(color="#dfe4e9", lw=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
+        _plain(ax)
     return figure

@@ -11,6 +11,8 @@ from emir_analysis.signals import Array, Signal, SignalMap, load
 OPENING, PRESSURE = "valve_opening", "oil_pressure"
 FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
 LARGEST_GAP = 1.5  # sampling periods
+AT_REST = 8  # samples from which on a machine may be seen to rest
+STEADY = 2.0  # times the noise: the most that a pressure at rest varies
 SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
 
 
@@ -32,6 +34,18 @@ class ActuatorRecord:
     def time(self) -> Array:
         """Return the stamps of the samples, (n,)."""
         return self.begin + self.period * np.arange(self.opening.size, dtype=np.float64)
+
+    @property
+    def start(self) -> float:
+        """Return the pressure at the first sample: of a machine at rest, until it is moved.
+
+        One sample's noise would swing on in a free run that is hardly damped.
+        """
+        moved = np.abs(self.opening - self.opening[0]) > SMALLEST_MOTION * np.ptp(self.opening)
+        still = self.pressure[: np.argmax(moved)]
+        if still.size >= AT_REST and np.std(still) <= STEADY * noise_of(still):
+            return float(np.mean(still))
+        return float(self.pressure[0])
 
     def follows(self, earlier: "ActuatorRecord") -> bool:
         """Return whether this recording goes on where another has ended."""
@@ -87,7 +101,7 @@ def noise_of(pressure: Array) -> float:
     At least the error of the steps in which it is recorded.
     """
     third = np.diff(pressure, 3)
-    step = np.min(np.diff(np.unique(pressure)))
+    step = np.min(np.diff(np.unique(pressure)), initial=np.ptp(pressure))
     return float(max(np.median(np.abs(third)) / (0.6745 * np.sqrt(20.0)), step / np.sqrt(12.0)))
 
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run, one_step_error
+from emir_analysis.diagnosis.actuator.curves import CurveResult, as_result
 from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
 from emir_analysis.diagnosis.actuator.search import Search
+from emir_analysis.diagnosis.actuator.verdict import BALANCE, statement, verdict
 from emir_analysis.diagnosis.result import (
     BalanceResult,
     EffectResult,
@@ -17,14 +19,12 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
     confounded,
 )
-from emir_analysis.diagnosis.select import AT_NOISE, EXPLAINED
+from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 from emir_analysis.signals import Array
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
-BALANCE = "oil"  # the only one that opening and pressure allow
-MUCH = 0.7  # of the error without effects, on parts left out: half of its square
 BLOCK = 2.0  # slow periods in a block of the bootstrap
 INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
 LABELS = {
@@ -57,6 +57,7 @@ class ActuatorDiagnosis:
     """What the model of an actuator lacks.
 
     rivals: sets of effects that would do as well, "a + b", where the verdict is ambiguous.
+    curve: what has no name, measured, where the verdict is unexplained.
     signals: over the judge recording; one_step: one sample ahead of the measured pressure.
     spread: standard deviation of the judged pressure.
     """
@@ -65,6 +66,7 @@ class ActuatorDiagnosis:
     statement: str
     effects: tuple[EffectResult, ...]
     rivals: tuple[str, ...]
+    curve: CurveResult | None
     candidates: tuple[CandidateResult, ...]
     balances: dict[str, BalanceResult]
     signals: dict[str, SignalResult]
@@ -85,11 +87,11 @@ def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:
 
 
 def stages(sheet: ActuatorSheet, found: Search) -> dict[str, Actuator]:
-    """Return the machine as stated, re-fitted, and with the effects that were chosen."""
+    """Return the machine as stated, re-fitted, and with the effects chosen, or the curve."""
     return {
         "nominal": sheet.machine,
         "refitted": found.plain.machine,
-        "with_effect": found.chosen.machine,
+        "with_effect": (found.curve or found.chosen).machine,
     }
 
 
@@ -141,6 +143,7 @@ def diagnosis(
 ) -> ActuatorDiagnosis:
     """Put the findings into numbers; runs: as `judged_runs` returns them."""
     noise = noise_floor(sheet, record)
+    curve = as_result(found.curve) if found.curve else None
     judged = record if judge is None else judge
     errors = {name: run - judged.pressure for name, run in runs.items()}
     shown = _rms(errors["with_effect"]) / noise
@@ -149,18 +152,19 @@ def diagnosis(
     slow = _slow_period(found)
     chosen = found.chosen
     fitted = _parameters(chosen)
-    verdict = _verdict(sheet, found, noise)
-    statement = _statement(verdict, found, noise)
-    if more and verdict != "unexplained":
-        verdict = "unexplained" if verdict == "nothing_missing" else verdict
-        statement += f"; but {judged.name}, {shown:.1f} times the noise, shows more"
+    word = verdict(sheet, found, noise)
+    said = statement(word, found, noise, curve)
+    if more and word != "unexplained":
+        word = "unexplained" if word == "nothing_missing" else word
+        said += f"; but {judged.name}, {shown:.1f} times the noise, shows more"
     return ActuatorDiagnosis(
-        verdict=verdict,
-        statement=statement,
+        verdict=word,
+        statement=said,
         effects=tuple(_effect(name, fitted) for name in chosen.effects)
-        if verdict in ("found", "ambiguous")
+        if word in ("found", "ambiguous")
         else (),
-        rivals=tuple(" + ".join(r.effects) for r in found.rivals if verdict == "ambiguous"),
+        curve=curve,
+        rivals=tuple(" + ".join(r.effects) for r in found.rivals if word == "ambiguous"),
         candidates=tuple(
             CandidateResult(
                 f.name, 2.0 * (f.evidence - found.plain.evidence), found.unseen.get(f.name)
@@ -168,7 +172,7 @@ def diagnosis(
             for f in found.tried
             if f.effects
         ),
-        balances={BALANCE: _balance(sheet, found, record, noise)},
+        balances={BALANCE: _balance(stages(sheet, found), slow, record, noise)},
         signals={PRESSURE: _signal(record.unit, noise, errors)},
         one_step={PRESSURE: _signal(record.unit, math.sqrt(2.0) * noise, ahead)},
         tests={PRESSURE: _tests(errors, ahead, judged, slow)},
@@ -211,46 +215,6 @@ def _unit(unit: str, result: ActuatorDiagnosis) -> str:
     return "" if shown == "1" else shown
 
 
-def _verdict(sheet: ActuatorSheet, found: Search, noise: float) -> str:
-    if found.unseen[found.plain.name] <= AT_NOISE * noise:
-        return "nothing_missing"
-    if not found.chosen.effects or not _explained(sheet, found, noise):
-        return "unexplained"
-    return "ambiguous" if found.rivals else "found"
-
-
-def _explained(sheet: ActuatorSheet, found: Search, noise: float) -> bool:
-    """Tell whether the chosen effects come to the noise, or do much where nobody has stated it."""
-    if found.chosen.rms <= AT_NOISE * noise:
-        return True
-    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
-    return not sheet.machine.sensor.pressure_noise and chosen <= MUCH * plain
-
-
-def _statement(verdict: str, found: Search, noise: float) -> str:
-    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
-    if verdict == "nothing_missing":
-        return "parameters inside their ranges bring the free run to the noise"
-    left = (
-        f"{found.chosen.rms:.3g} is left, {found.chosen.rms / noise:.1f} times the noise, and"
-        f" {chosen:.3g} on parts left out of the fit, {plain:.3g} with parameters only"
-    )
-    if verdict == "unexplained":
-        closest = f"{found.chosen.name} comes closest; " if found.chosen.effects else ""
-        return f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says why"
-    names = found.chosen.name
-    if verdict == "ambiguous":
-        rivals = " or ".join(_instead(rival, found.chosen) for rival in found.rivals)
-        names += f" ({rivals} would do as well: this recording cannot tell)"
-    return f"{names}; {left}"
-
-
-def _instead(rival: Fitted, chosen: Fitted) -> str:
-    added = [name for name in rival.effects if name not in chosen.effects]
-    missing = [name for name in chosen.effects if name not in rival.effects]
-    return f"{' and '.join(added)} in place of {' and '.join(missing)}"
-
-
 def _signal(unit: str, noise: float, errors: dict[str, Array]) -> SignalResult:
     return SignalResult(unit, noise, **{name: _rms(error) for name, error in errors.items()})
 
@@ -289,16 +253,16 @@ def _effect(name: str, fitted: dict[str, ParameterResult]) -> EffectResult:
 
 
 def _balance(
-    sheet: ActuatorSheet, found: Search, record: ActuatorRecord, noise: float
+    machines: dict[str, Actuator], slow: float, record: ActuatorRecord, noise: float
 ) -> BalanceResult:
-    window = max(1, round(0.5 * _slow_period(found) / record.period))
+    window = max(1, round(0.5 * slow / record.period))
 
     def missing(machine: Actuator) -> float:
         modelled = driven(machine, record.opening, record.pressure, record.period)
         rest = record.pressure - modelled
         return _rms(rest[window:] - rest[:-window])
 
-    figures = (missing(machine) for machine in stages(sheet, found).values())
+    figures = (missing(machine) for machine in machines.values())
     return BalanceResult(record.unit, math.sqrt(2.0) * noise, *figures)
 
 

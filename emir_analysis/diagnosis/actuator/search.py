@@ -11,7 +11,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
-from emir_analysis.diagnosis.select import AT_NOISE
+from emir_analysis.diagnosis.select import AT_NOISE, STRONG
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
 PARTS = 4  # of the recording, each left out once: whole movements, not pieces between their like
@@ -31,7 +31,8 @@ class Search:
     """The fits of all sets that were tried, the best first; rivals: as good and no larger.
 
     unseen: RMS error of parts left out of the fit, each simulated by a machine that has not seen
-    it, by the sets' names: of parameters only, of the chosen set and of its rivals.
+    it, by the sets' names: of parameters only, of the chosen set and of its rivals. curve: the
+    machine with what has no name as a curve, where one is measured.
     """
 
     plain: Fitted
@@ -39,6 +40,7 @@ class Search:
     tried: tuple[Fitted, ...]
     rivals: tuple[Fitted, ...]
     unseen: dict[str, float]
+    curve: Fitted | None = None
 
 
 def search(
@@ -47,15 +49,15 @@ def search(
     """Add and drop single effects, from none on, while that leads to sets of more evidence.
 
     The sets with the most evidence are fitted once more from each other's machines. Of those as
-    good as the best one that with the fewest parameters is chosen. noise: of the pressure; a
-    model that is down to it lacks nothing.
+    good as the best one that with the fewest parameters is chosen; where parameters alone are at
+    the noise of the pressure, one that is much more probable, or none.
     """
     progress("parameters only")
     plain = fit(sheet, (), record, noise, drawn=DRAWN_ALONE)
     tried = {_key(plain): plain}
     left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
     best = plain
-    while not (best is plain and best.rms <= AT_NOISE * noise):
+    while True:
         breadth = 1 if best.rms <= AT_NOISE * noise else BREADTH
         parents = [f for f in _first(tried.values(), breadth) if _key(f) not in left]
         if not parents:
@@ -69,16 +71,29 @@ def search(
     progress("the best from each other's machines")
     good = _first(tried.values(), SETTLED)
     machines = [f.machine for f in good]
-    again = _each(good, lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN))
+    again = each(good, lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN))
     tried |= {_key(f): f for f in again}
     ordered = _first(tried.values(), len(tried))
+    plain = tried[frozenset()]
+    chosen, rivals = _choice(ordered)
+    if plain.rms <= AT_NOISE * noise and _better(chosen, plain) < STRONG:
+        chosen, rivals = plain, []
+    shown = [plain, chosen, *rivals]
+    progress("parts left out")
+    unseen = {f.name: unseen_error(sheet, f.effects, record, noise) for f in shown}
+    return Search(plain, chosen, tuple(ordered), tuple(rivals), unseen)
+
+
+def _choice(ordered: list[Fitted]) -> tuple[Fitted, list[Fitted]]:
+    """Return the smallest of the sets as good as the best one, and others no larger."""
     as_good = [f for f in ordered if _probable(f) > _probable(ordered[0]) - BARE_MENTION]
     chosen = min(as_good, key=lambda f: f.x.size)
-    rivals = [f for f in as_good if f is not chosen and f.x.size <= chosen.x.size]
-    shown = [tried[frozenset()], chosen, *rivals]
-    progress("parts left out")
-    unseen = {f.name: _unseen(sheet, f.effects, record, noise) for f in shown}
-    return Search(tried[frozenset()], chosen, tuple(ordered), tuple(rivals), unseen)
+    return chosen, [f for f in as_good if f is not chosen and f.x.size <= chosen.x.size]
+
+
+def _better(one: Fitted, other: Fitted) -> float:
+    """Return by how much a set is more probable, as STRONG is meant."""
+    return 2.0 * (_probable(one) - _probable(other))
 
 
 def _key(fitted: Fitted) -> frozenset[str]:
@@ -111,36 +126,36 @@ def _neighbours(
     sets = [_key(parent) ^ {name} for name in REGISTRY]
     new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
-    first = _each(
+    first = each(
         ordered,
         lambda effects: fit(sheet, effects, record, noise, [parent.machine], levels=True),
     )
     first = _first(first, len(first))
     better, others = first[: len(first) // 2], first[len(first) // 2 :]
-    again = _each(better, lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=DRAWN))
+    again = each(better, lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=DRAWN))
     return [*again, *others]
 
 
-def _unseen(
+def unseen_error(
     sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord, noise: float
 ) -> float:
     """Return the RMS error of all parts, each by a fit that knows nothing of it."""
     number = np.arange(record.pressure.size) * PARTS // record.pressure.size
     parts = [number == part for part in range(PARTS)]
-    fits = _each(
+    known = [sheet.machine]
+    fits = each(
         parts,
         lambda part: fit(
-            sheet, effects, record, noise, [sheet.machine],
-            seen=~part, drawn=DRAWN_ALONE, levels=True,
+            sheet, effects, record, noise, known, seen=~part, drawn=DRAWN_ALONE, levels=True
         ),
-    )  # fmt: skip
+    )
     error = np.zeros(record.pressure.size)
     for part, fitted in zip(parts, fits, strict=True):
         error[part] = free_run_error(fitted.machine, record)[part]
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:
+def each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:
     """Return the fit of each thing, fitted side by side on as many cores as numba may use."""
     with ThreadPoolExecutor(numba.get_num_threads()) as threads:
         return list(threads.map(fitted, things))

@@ -1,0 +1,78 @@
+"""What has no name, measured: the curve over one signal that explains an actuator best."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
+from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.actuator.search import Search, each, unseen_error
+from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
+from emir_plant.actuator import Actuator, ActuatorSheet
+from emir_plant.actuator.model import way
+from emir_plant.actuator.unnamed import CURVES, points
+
+SHARE = 0.7  # of the error on parts left out, half of its square: a curve that leaves more is none
+DRAWN = 3  # starts at random
+
+
+@dataclass(frozen=True)
+class CurveResult:
+    """A curve: what over which signal, its points (signal, value).
+
+    left: RMS error of the recording with it.
+    """
+
+    name: str
+    what: str
+    over: str
+    balance: str
+    points: tuple[tuple[float, float], ...]
+    left: float
+
+
+def measured(
+    sheet: ActuatorSheet, found: Search, record: ActuatorRecord, noise: float
+) -> Fitted | None:
+    """Return the machine with the most probable curve, if that foretells parts left out.
+
+    It has to leave less than SHARE of what parameters alone do there, and less than the effects
+    that come closest.
+    """
+    sheets = [_with_places(sheet, n, v) for n, v in _visited(found.plain.machine, record).items()]
+    known = [found.plain.machine]
+    fits = each(
+        zip(CURVES, sheets, strict=True),
+        lambda named: fit(named[1], (named[0],), record, noise, known, drawn=DRAWN),
+    )
+    best = max(range(len(fits)), key=lambda k: fits[k].evidence)
+    unseen = unseen_error(sheets[best], fits[best].effects, record, noise)
+    plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
+    return fits[best] if unseen < min(SHARE * plain, chosen) else None
+
+
+def as_result(curve: Fitted) -> CurveResult:
+    """Return a fitted curve in words and numbers."""
+    (name,) = curve.effects
+    kind, fitted = CURVES[name], getattr(curve.machine.effects, name)
+    return CurveResult(name, kind.what, kind.over, kind.balance, points(fitted), curve.rms)
+
+
+def _with_places(sheet: ActuatorSheet, name: str, visited: Array) -> ActuatorSheet:
+    """Return a sheet with a curve that reaches over what its signal does, (n,)."""
+    ends = {"low": float(visited.min()), "high": float(visited.max())}
+    machine = with_values(sheet.machine, {f"effects.{name}.{k}": v for k, v in ends.items()})
+    return replace(sheet, machine=machine)
+
+
+def _visited(machine: Actuator, record: ActuatorRecord) -> dict[str, Array]:
+    """Return the signal that each curve is over, (n,), by the measured pressure."""
+    moved = way(machine, record.opening, record.pressure, record.period)
+    signals = {
+        "valve opening": record.opening,
+        "oil pressure": record.pressure,
+        "velocity": np.gradient(moved, record.period),
+        "way": moved,
+    }
+    return {name: signals[kind.over] for name, kind in CURVES.items()}

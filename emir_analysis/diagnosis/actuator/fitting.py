@@ -131,6 +131,8 @@ class _Surplus:
         self._part = slice(None) if seen is None else seen
         self._measured = record.pressure[self._part]
         slow = 2.0 * math.pi / sheet.machine.load.frequency / record.period
+        spread = float(np.std(record.pressure))
+        self.guessed, self.exact = GUESSED * spread, EXACT * spread
         self._noise = noise
         # how many samples a model's error takes to be another one
         self._lasting = max(1.0, slow / INDEPENDENT)
@@ -206,13 +208,6 @@ class _Surplus:
             bounds=(self.low, self.high), xtol=ACCURACY, ftol=ACCURACY, max_nfev=evaluations,
         )  # fmt: skip
 
-    def least_of(self, starts: Sequence[Array], rms: float) -> OptimizeResult:
-        """Return the least minimum that is reached from places: the best begun are ended."""
-        begun = [self.least(x, rms, SHORT) for x in starts]
-        begun.sort(key=lambda found: float(found.cost))
-        ended = [self.least(found.x, rms) for found in begun[:ENDED]]
-        return min(ended, key=lambda found: float(found.cost))
-
 
 def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     sheet: ActuatorSheet,
@@ -224,32 +219,43 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     seen: Mask | None = None,
     drawn: int = 0,
     levels: bool = False,
+    thorough: bool = False,
 ) -> Fitted:
     """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
 
     noise: of the pressure. Starts are each known machine, effects that it lacks at their trial
     values, or with `levels` at all LEVELS of them; without any what is expected; and the best
     `drawn` of places drawn from what is expected.
+    thorough: each of them is gone on from to the end.
     """
     members = unknowns(sheet, effects)
     surplus = _Surplus(sheet, members, record, noise, seen)
-    spread = float(np.std(record.pressure))
-    rms = GUESSED * spread
     starts = [] if known else [surplus.expected]
     for machine in known:
         starts += _starts(sheet, members, machine) if levels else [_place(members, machine)]
     if drawn:
-        starts += surplus.drawn(rms)[:drawn]
-    best = surplus.least_of(starts, rms)
+        starts += surplus.drawn(surplus.guessed)[:drawn]
+    begun = [surplus.least(x, surplus.guessed, SHORT) for x in starts]
+    begun.sort(key=lambda found: float(found.cost))
+    ended = begun if thorough else begun[:ENDED]
+    fits = [_ended(sheet, effects, surplus, found.x) for found in ended]
+    return max(fits, key=lambda fitted: fitted.evidence)
+
+
+def _ended(
+    sheet: ActuatorSheet, effects: tuple[str, ...], surplus: _Surplus, start: Array
+) -> Fitted:
+    """Return the machine of the minimum that is reached from a place, (k,)."""
+    best, rms = surplus.least(start, surplus.guessed), surplus.guessed
     for _ in range(ROUNDS):
-        rms = max(surplus.rms(best.x), EXACT * spread)
+        rms = max(surplus.rms(best.x), surplus.exact)
         best = surplus.least(best.x, rms)
     curvature = best.jac.T @ best.jac  # of the logarithm of the probability
     narrower = np.linalg.slogdet(surplus.deviation[:, None] * curvature * surplus.deviation)[1]
-    values = {m.path: m.value(float(v)) for m, v in zip(members, best.x, strict=True)}
+    values = {m.path: m.value(float(v)) for m, v in zip(surplus.members, best.x, strict=True)}
     return Fitted(
         effects,
-        members,
+        surplus.members,
         with_values(sheet.machine, values),
         np.asarray(best.x),
         np.linalg.pinv(curvature, hermitian=True),

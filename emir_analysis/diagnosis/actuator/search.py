@@ -71,7 +71,10 @@ def search(
     progress("the best from each other's machines")
     good = _first(tried.values(), SETTLED)
     machines = [f.machine for f in good]
-    again = each(good, lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN))
+    again = each(
+        good,
+        lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN, thorough=True),
+    )
     tried |= {_key(f): f for f in again}
     ordered = _first(tried.values(), len(tried))
     plain = tried[frozenset()]

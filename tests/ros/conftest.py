@@ -1,5 +1,6 @@
 """What the tests of this folder share: an rclpy that runs; and they may import helpers."""
 
+import gc
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,3 +19,4 @@ def ros(ros_domain: int) -> Iterator[None]:
     rclpy.init()
     yield
     rclpy.try_shutdown()
+    gc.collect()  # else the test's nodes may stay in this domain, which has its turn again

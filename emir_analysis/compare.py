@@ -106,8 +106,7 @@ def _check_way(plant: Plant, trajectory: AwayAndBack, angle: float) -> None:
     """Raise SimulationError for a move into the ends of the stroke, where all would stand still."""
     start = plant.outputs(plant.initial(angle, REST_PRESSURE)).stroke
     end = start + trajectory.parameters.distance
-    limits = LimitParameters()
-    low, high = limits.stroke_low + limits.end_margin, limits.stroke_high - limits.end_margin
+    low, high = LimitParameters().free_stroke
     if min(start, end) < low or max(start, end) > high:
         raise SimulationError(
             f"from {math.degrees(angle):.1f} deg the move takes the stroke from {start:.3f} to"

@@ -129,9 +129,7 @@ class _Boom:
 
 def _axis(name: str, linkage: Linkage) -> Axis:
     limits = LimitParameters()
-    margin = limits.end_margin
-    low, high = limits.stroke_low + margin, limits.stroke_high - margin
-    return Axis(name, linkage, low, high, limits.speed)
+    return Axis(name, linkage, *limits.free_stroke, limits.speed)
 
 
 JOINT1_STROKE, JOINT1_ANGLE = _axis("cylinder1", Direct()), _axis("joint1", _Boom())

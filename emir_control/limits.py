@@ -29,6 +29,11 @@ class LimitParameters:
                 f" = {self.stroke_low:g} m between the margins"
             )
 
+    @property
+    def free_stroke(self) -> tuple[float, float]:
+        """Return the strokes, m, that commands may lead to: the margins are kept off both ends."""
+        return self.stroke_low + self.end_margin, self.stroke_high - self.end_margin
+
 
 def limited(wanted: float, last: float, stroke: float, dt: float, p: LimitParameters) -> float:
     """Return the velocity, m/s, allowed in a period of dt, s, at a stroke, m, after the last one.

@@ -21,12 +21,7 @@ from numpy.typing import NDArray
 
 from emir_common.parameter_tree import declared
 from emir_plant.actuator.parameters import Actuator
-from emir_plant.actuator.unnamed import (
-    unnamed_flow,
-    unnamed_force,
-    unnamed_friction,
-    unnamed_leakage,
-)
+from emir_plant.actuator.unnamed import PLACES, straight
 from emir_plant.effects.smooth_sign import smooth_sign
 from emir_plant.jit import compiled_for_threads, compiled_in_place
 
@@ -50,19 +45,30 @@ class Rates(NamedTuple):
 
 
 @cache
-def _fields(names: tuple[str, ...]) -> np.dtype[Any]:
-    return np.dtype([(name, np.float64) for name in names])
+def _layout(paths: tuple[str, ...]) -> np.dtype[Any]:
+    shapes = {path: (PLACES,) if path.endswith(".points") else () for path in paths}
+    return np.dtype([(_field(path), np.float64, shape) for path, shape in shapes.items()])
 
 
-def field(path: str) -> str:
-    """Return the record's field of a parameter given by its dotted path."""
+def _field(path: str) -> str:
     return path.replace(".", "_")
 
 
 def record(actuator: Actuator) -> NDArray[Any]:
     """Return the parameters as the flat record, (1,), that the compiled functions read."""
-    values = {field(path): value for path, (_, value) in declared(actuator).items()}
-    return np.array([tuple(values.values())], dtype=_fields(tuple(values)))
+    values = {path: value for path, (_, value) in declared(actuator).items()}
+    return np.array([tuple(values.values())], dtype=_layout(tuple(values)))
+
+
+def column(records: NDArray[Any], path: str) -> Array:
+    """Return a view, (m,), of the parameter of a dotted path in (m,) records.
+
+    One number of a list is given by its place behind the list's path.
+    """
+    whole, _, place = path.rpartition(".")
+    if place.isdecimal():
+        return np.asarray(records[_field(whole)])[:, int(place)]
+    return np.asarray(records[_field(path)])
 
 
 def simulate(actuator: Actuator, command: Array, period: float, start: float = 0.0) -> Array:
@@ -194,19 +200,43 @@ def _light_piston(pressure: float, damper: float, p: Any) -> float:
 
 
 @compiled_in_place
+def _unnamed_flow(opening: float, p: Any) -> float:
+    low, high = p.effects_unnamed_flow_low, p.effects_unnamed_flow_high
+    return straight(opening, low, high, p.effects_unnamed_flow_points)
+
+
+@compiled_in_place
+def _unnamed_leakage(pressure: float, p: Any) -> float:
+    low, high = p.effects_unnamed_leakage_low, p.effects_unnamed_leakage_high
+    return straight(pressure, low, high, p.effects_unnamed_leakage_points)
+
+
+@compiled_in_place
+def _unnamed_friction(velocity: float, p: Any) -> float:
+    low, high = p.effects_unnamed_friction_low, p.effects_unnamed_friction_high
+    return straight(velocity, low, high, p.effects_unnamed_friction_points)
+
+
+@compiled_in_place
+def _unnamed_force(way: float, p: Any) -> float:
+    low, high = p.effects_unnamed_force_low, p.effects_unnamed_force_high
+    return straight(way, low, high, p.effects_unnamed_force_points)
+
+
+@compiled_in_place
 def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
     """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
-    flow = _flow(x[SPOOL], pressure, p) + unnamed_flow(x[SPOOL], p)
+    flow = _flow(x[SPOOL], pressure, p) + _unnamed_flow(x[SPOOL], p)
     relief = 0.0
     if p.effects_relief_valve_high > 0.0:
         relief += RELIEF * max(pressure - p.effects_relief_valve_high, 0.0)
     if p.effects_relief_valve_low > 0.0:
         relief -= RELIEF * max(-pressure - p.effects_relief_valve_low, 0.0)
     leakage = p.effects_internal_leakage_conductance * pressure + relief
-    leakage += unnamed_leakage(pressure, p)
+    leakage += _unnamed_leakage(pressure, p)
     mass = p.load_frequency * p.load_frequency
     load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
-    load -= unnamed_force(x[WAY], p)
+    load -= _unnamed_force(x[WAY], p)
     if p.effects_elastic_boom_compliance > 0.0:
         damper = _damper(p)
         spring = _spring_force(x[ARM_WAY], p)
@@ -218,7 +248,7 @@ def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float
     else:
         velocity = x[VELOCITY]
         carrier = velocity
-        resisting = _friction(velocity, p) + unnamed_friction(velocity, p)
+        resisting = _friction(velocity, p) + _unnamed_friction(velocity, p)
         slope[VELOCITY] = mass * (pressure - load - resisting)
         slope[ARM] = 0.0
         slope[ARM_WAY] = 0.0

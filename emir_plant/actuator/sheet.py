@@ -64,12 +64,12 @@ def write_actuator(path: Path, sheet: ActuatorSheet) -> None:
     content: dict[str, Any] = {"machine": MACHINE, "time_unit": sheet.time_unit}
     for dotted, (_, value) in declared(sheet.machine).items():
         *groups, name = dotted.split(".")
-        if groups[0] == "effects" and not _is_on(sheet.machine, groups[1]):
+        if groups[0] == "effects" and not getattr(sheet.machine.effects, groups[1]).is_on:
             continue
         place = content
         for group in groups:
             place = place.setdefault(group, {})
-        entry = {"value": value}
+        entry = {"value": list(value) if isinstance(value, tuple) else value}
         if dotted in sheet.ranges:
             entry["range"] = list(sheet.ranges[dotted])
         place[name] = entry
@@ -77,11 +77,6 @@ def write_actuator(path: Path, sheet: ActuatorSheet) -> None:
         path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror}") from None
-
-
-def _is_on(machine: Actuator, effect: str) -> bool:
-    members = getattr(machine.effects, effect)
-    return any(getattr(members, size) != 0.0 for size in members.sizes)
 
 
 def _sheet(content: dict[Any, Any]) -> ActuatorSheet:
@@ -96,7 +91,7 @@ def _sheet(content: dict[Any, Any]) -> ActuatorSheet:
     for path in _NEEDED:
         if path not in entries:
             raise ParameterError(f"{path}: missing")
-    values = {path: _number(entry["value"], path) for path, entry in entries.items()}
+    values = {path: _value(entry["value"], path) for path, entry in entries.items()}
     ranges = {p: _range(e["range"], p, values[p]) for p, e in entries.items() if "range" in e}
     return ActuatorSheet(with_values(_BLANK, values), ranges, time_unit)
 
@@ -127,13 +122,19 @@ def _entries(content: dict[Any, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _range(limits: Any, path: str, value: float) -> tuple[float, float]:
+def _range(limits: Any, path: str, value: Any) -> tuple[float, float]:
+    if isinstance(value, list):
+        raise ParameterError(f"{path}: a list has no range")
     if not isinstance(limits, list) or len(limits) != 2:  # noqa: PLR2004 - low and high
         raise ParameterError(f"{path}: range = {limits!r}: not a list of lowest and highest value")
     low, high = (_number(limit, path) for limit in limits)
     if not low <= value <= high or low == high:
         raise ParameterError(f"{path} = {value:g}: outside its range {low:g} ... {high:g}")
     return low, high
+
+
+def _value(value: Any, path: str) -> Any:
+    return [_number(v, path) for v in value] if isinstance(value, list) else _number(value, path)
 
 
 def _number(value: Any, path: str) -> float:

@@ -1,7 +1,7 @@
 """What an actuator has by no law that has a name: curves, straight between places.
 
-A diagnosis measures one where no effect explains a recording. Outside its places a curve stays at
-its ends.
+A diagnosis measures one where no effect explains a recording. Beyond its places a curve stays as
+it is at its ends.
 """
 
 from dataclasses import dataclass
@@ -12,38 +12,45 @@ from emir_plant.effects.base import Balance, Effect
 from emir_plant.jit import compiled_in_place
 
 PLACES = 7
-MEASURED = "measured: a recording tells the curve, no law does"
-POINTS = tuple(f"at_{k}" for k in range(PLACES))
+NONE = (0.0,) * PLACES
+BEYOND = 1e12  # of a signal: only a run out of all bounds has it
 
 
 @dataclass(frozen=True)
 class Curve(Effect):
-    """A curve over one signal. over: the signal, and its unit.
+    """A curve over one signal, off without points.
 
-    low, high: of the signal, the first and the last of evenly spaced places. at_0 ... at_6: the
-    values there.
+    over: the signal. what: stands for the points. low, high: of the signal, in its unit, the first
+    and the last of evenly spaced places. points: the values there, a flow or a force as the
+    actuator has them (`model.py`).
     """
 
-    sizes: ClassVar[tuple[str, ...]] = POINTS
-    source: ClassVar[str] = MEASURED
-    trial: ClassVar[dict[str, float]] = dict.fromkeys(POINTS, 0.1)
+    sizes: ClassVar[tuple[str, ...]] = ("points",)
+    source: ClassVar[str] = "measured: a recording tells the curve, no law does"
+    trial: ClassVar[dict[str, float]] = {"points": 0.1}
     over: ClassVar[str]
     what: ClassVar[str]
 
     low: float = quantity("1", -1e6, 1e6, "of the signal, the first place", default=0.0)
     high: float = quantity("1", -1e6, 1e6, "of the signal, the last place", default=0.0)
-    at_0: float = quantity("1", -100.0, 100.0, "value at low", default=0.0)
-    at_1: float = quantity("1", -100.0, 100.0, "a sixth of the way behind", default=0.0)
-    at_2: float = quantity("1", -100.0, 100.0, "two sixths behind", default=0.0)
-    at_3: float = quantity("1", -100.0, 100.0, "half way", default=0.0)
-    at_4: float = quantity("1", -100.0, 100.0, "four sixths behind", default=0.0)
-    at_5: float = quantity("1", -100.0, 100.0, "five sixths behind", default=0.0)
-    at_6: float = quantity("1", -100.0, 100.0, "value at high", default=0.0)
+    points: tuple[float, ...] = quantity(
+        "1", -100.0, 100.0, "flow or force at evenly spaced places", default=NONE, count=PLACES
+    )
+
+    @property
+    def is_on(self) -> bool:
+        """Tell whether any of its points is not zero."""
+        return any(self.points)
+
+    def table(self) -> tuple[tuple[float, float], ...]:
+        """Return the places, in the signal's unit, and the points."""
+        width = (self.high - self.low) / (PLACES - 1)
+        return tuple((self.low + k * width, point) for k, point in enumerate(self.points))
 
 
 @dataclass(frozen=True)
 class UnnamedFlow(Curve):
-    """Flow through the valve by the spool's opening."""
+    """Flow by the spool's opening, positive where it lifts, beside what the valve gives."""
 
     balance: ClassVar[Balance] = "valve"
     over: ClassVar[str] = "valve opening"
@@ -61,7 +68,7 @@ class UnnamedLeakage(Curve):
 
 @dataclass(frozen=True)
 class UnnamedFriction(Curve):
-    """Force against the piston by its velocity, as a pressure."""
+    """Force against the piston by its velocity, as a pressure; without an elastic arm alone."""
 
     balance: ClassVar[Balance] = "force"
     over: ClassVar[str] = "velocity"
@@ -70,7 +77,7 @@ class UnnamedFriction(Curve):
 
 @dataclass(frozen=True)
 class UnnamedForce(Curve):
-    """Force on the piston by the way that it has moved, as a pressure."""
+    """Force on the piston by the way that it has moved, as a pressure, positive where it lifts."""
 
     balance: ClassVar[Balance] = "force"
     over: ClassVar[str] = "way"
@@ -86,95 +93,16 @@ CURVES: dict[str, type[Curve]] = {
 
 
 @compiled_in_place
-def _hat(place: float, middle: float) -> float:
-    return max(1.0 - abs(place - middle), 0.0)
+def straight(signal: float, low: float, high: float, points: Any) -> float:
+    """Return a curve's value at a signal, straight between its points, (PLACES,).
 
-
-@compiled_in_place
-def _curve(place: float, points: Any) -> float:
-    """Return the value at a place, 0 ... 1, of a curve with these values at its points."""
-    at = min(max(place, 0.0), 1.0) * (PLACES - 1)
-    a, b, c, d, e, f, g = points
-    value: float = (
-        a * _hat(at, 0.0) + b * _hat(at, 1.0) + c * _hat(at, 2.0) + d * _hat(at, 3.0)
-        + e * _hat(at, 4.0) + f * _hat(at, 5.0) + g * _hat(at, 6.0)
-    )  # fmt: skip
+    0 without places.
+    """
+    if high == low:
+        return 0.0
+    if not abs(signal) < BEYOND:  # a run out of all bounds: no place
+        return 0.0
+    place = min(max((signal - low) / (high - low), 0.0), 1.0) * (PLACES - 1)
+    behind = int(min(place, PLACES - 2.0))
+    value: float = points[behind] + (place - behind) * (points[behind + 1] - points[behind])
     return value
-
-
-@compiled_in_place
-def unnamed_flow(opening: float, p: Any) -> float:
-    """Return the flow at a spool's opening; none without places."""
-    low, high = p.effects_unnamed_flow_low, p.effects_unnamed_flow_high
-    if high == low:
-        return 0.0
-    points = (
-        p.effects_unnamed_flow_at_0,
-        p.effects_unnamed_flow_at_1,
-        p.effects_unnamed_flow_at_2,
-        p.effects_unnamed_flow_at_3,
-        p.effects_unnamed_flow_at_4,
-        p.effects_unnamed_flow_at_5,
-        p.effects_unnamed_flow_at_6,
-    )
-    return _curve((opening - low) / (high - low), points)
-
-
-@compiled_in_place
-def unnamed_leakage(pressure: float, p: Any) -> float:
-    """Return the flow out of the chamber at a pressure; none without places."""
-    low, high = p.effects_unnamed_leakage_low, p.effects_unnamed_leakage_high
-    if high == low:
-        return 0.0
-    points = (
-        p.effects_unnamed_leakage_at_0,
-        p.effects_unnamed_leakage_at_1,
-        p.effects_unnamed_leakage_at_2,
-        p.effects_unnamed_leakage_at_3,
-        p.effects_unnamed_leakage_at_4,
-        p.effects_unnamed_leakage_at_5,
-        p.effects_unnamed_leakage_at_6,
-    )
-    return _curve((pressure - low) / (high - low), points)
-
-
-@compiled_in_place
-def unnamed_friction(velocity: float, p: Any) -> float:
-    """Return the force against a velocity; none without places."""
-    low, high = p.effects_unnamed_friction_low, p.effects_unnamed_friction_high
-    if high == low:
-        return 0.0
-    points = (
-        p.effects_unnamed_friction_at_0,
-        p.effects_unnamed_friction_at_1,
-        p.effects_unnamed_friction_at_2,
-        p.effects_unnamed_friction_at_3,
-        p.effects_unnamed_friction_at_4,
-        p.effects_unnamed_friction_at_5,
-        p.effects_unnamed_friction_at_6,
-    )
-    return _curve((velocity - low) / (high - low), points)
-
-
-@compiled_in_place
-def unnamed_force(way: float, p: Any) -> float:
-    """Return the force on the piston at a way; none without places."""
-    low, high = p.effects_unnamed_force_low, p.effects_unnamed_force_high
-    if high == low:
-        return 0.0
-    points = (
-        p.effects_unnamed_force_at_0,
-        p.effects_unnamed_force_at_1,
-        p.effects_unnamed_force_at_2,
-        p.effects_unnamed_force_at_3,
-        p.effects_unnamed_force_at_4,
-        p.effects_unnamed_force_at_5,
-        p.effects_unnamed_force_at_6,
-    )
-    return _curve((way - low) / (high - low), points)
-
-
-def points(found: Any) -> tuple[tuple[float, float], ...]:
-    """Return a curve's places and its values there."""
-    width = (found.high - found.low) / (PLACES - 1)
-    return tuple((found.low + k * width, getattr(found, name)) for k, name in enumerate(POINTS))

@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 from emir_analysis.cli import main
 from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
-from emir_analysis.diagnosis.actuator.fitting import fit
+from emir_analysis.diagnosis.actuator.fitting import fit, narrowed
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
@@ -195,6 +195,13 @@ def test_the_evidence_is_the_integral_over_what_is_expected(folder: Path) -> Non
     beyond, _ = quad(lambda size: independent(np.exp(size)), np.log(noise), np.log(found.rms))
     whole = np.log(integral) - samples / lasting * np.log(noise) - beyond
     assert found.evidence == pytest.approx(whole, abs=0.05)
+
+
+def test_what_data_narrow_is_told_however_much_it_is() -> None:
+    """det(1 + s^2 a a') = 1 + s^2 a'a, while the matrix itself is singular in rounding."""
+    jacobian = np.vstack([np.eye(2), [1e9, 1e9]])
+    assert np.linalg.slogdet(jacobian.T @ jacobian)[1] < 0.0
+    assert narrowed(jacobian, np.ones(2)) == pytest.approx(0.5 * np.log(1.0 + 2e18))
 
 
 def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None:

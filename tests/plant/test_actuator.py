@@ -22,6 +22,7 @@ from emir_plant.actuator.parameters import Load, Valve
 from emir_plant.actuator.unnamed import PLACES
 
 PLAIN = Actuator(Valve(gain=1.5, time_constant=2.0), Load(frequency=0.3, viscous_friction=0.4))
+WHOLE = "valve: {gain: 1.0, time_constant: 1.0}\nload: {frequency: 1.0}"
 TIME = np.arange(300.0)
 OPENING = np.interp(TIME, [0, 20, 60, 90, 150, 180, 299], [0, 0, 0.8, 0.8, -0.9, 0.1, 0.1])
 
@@ -106,9 +107,8 @@ def test_a_straight_curve_is_what_has_a_name(
     curve: str, slope: float, named: dict[str, float]
 ) -> None:
     places = np.linspace(-100.0, 100.0, PLACES)
-    values = {f"at_{k}": float(slope * place) for k, place in enumerate(places)}
-    ends = {"low": -100.0, "high": 100.0}
-    machine = with_values(PLAIN, {f"effects.{curve}.{k}": v for k, v in (values | ends).items()})
+    values = {"low": -100.0, "high": 100.0, "points": (slope * places).tolist()}
+    machine = with_values(PLAIN, {f"effects.{curve}.{k}": v for k, v in values.items()})
     expected = simulate(with_values(PLAIN, named), OPENING, 1.0)
     np.testing.assert_allclose(simulate(machine, OPENING, 1.0), expected, atol=1e-9)
 
@@ -159,7 +159,9 @@ def test_dry_friction_holds_a_light_piston_until_the_pressure_exceeds_it() -> No
 
 
 def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
-    sheet = ActuatorSheet(_with("valve_hysteresis"), {"valve.gain": (0.5, 3.0)}, "sample")
+    measured = {"effects.unnamed_flow.high": 1.0, "effects.unnamed_flow.points.2": 0.3}
+    machine = with_values(_with("valve_hysteresis"), measured)
+    sheet = ActuatorSheet(machine, {"valve.gain": (0.5, 3.0)}, "sample")
     write_actuator(tmp_path / "sheet.yaml", sheet)
     assert load_actuator(tmp_path / "sheet.yaml") == sheet
 
@@ -173,6 +175,12 @@ def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
         ("valve: {volume: 1.0}", "valve.volume: there is no such parameter"),
         ("effects: {magic: {size: 1.0}}", "effects.magic: there is no such effect"),
         ("time_unit: hours", "time_unit"),
+        (f"{WHOLE}\neffects: {{unnamed_flow: {{points: [1.0]}}}}", "not a list of 7 numbers"),
+        (
+            f"{WHOLE}\neffects: {{unnamed_flow: {{points: {{value: [0], range: [0, 1]}}}}}}",
+            "a list has no range",
+        ),
+        ("valve: {gain: [1.0], time_constant: 1.0}\nload: {frequency: 1.0}", "not a number"),
         ("efects: {}", "efects: there is no such entry"),
         (
             "valve: {gain: {value: 9, range: [1, 2]}, time_constant: 1.0}\nload: {frequency: 1.0}",

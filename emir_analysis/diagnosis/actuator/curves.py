@@ -6,22 +6,19 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
-from emir_analysis.diagnosis.actuator.search import Search, each, unseen_error
+from emir_analysis.diagnosis.actuator.search import DRAWN, MUCH, Search, each, unseen_error
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.actuator import Actuator, ActuatorSheet
 from emir_plant.actuator.model import way
-from emir_plant.actuator.unnamed import CURVES, points
-
-SHARE = 0.7  # of the error on parts left out, half of its square: a curve that leaves more is none
-DRAWN = 3  # starts at random
+from emir_plant.actuator.unnamed import CURVES
 
 
 @dataclass(frozen=True)
 class CurveResult:
-    """A curve: what over which signal, its points (signal, value).
+    """A curve: what over which signal, its points (signal, value) in the units of the data sheet.
 
-    left: RMS error of the recording with it.
+    left: RMS error of the recording with it, in the pressure's unit.
     """
 
     name: str
@@ -37,7 +34,7 @@ def measured(
 ) -> Fitted | None:
     """Return the machine with the most probable curve, if that foretells parts left out.
 
-    It has to leave less than SHARE of what parameters alone do there, and less than the effects
+    It has to leave less than MUCH of what parameters alone do there, and less than the effects
     that come closest.
     """
     sheets = [_with_places(sheet, n, v) for n, v in _visited(found.plain.machine, record).items()]
@@ -49,14 +46,14 @@ def measured(
     best = max(range(len(fits)), key=lambda k: fits[k].evidence)
     unseen = unseen_error(sheets[best], fits[best].effects, record, noise)
     plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
-    return fits[best] if unseen < min(SHARE * plain, chosen) else None
+    return fits[best] if unseen < min(MUCH * plain, chosen) else None
 
 
 def as_result(curve: Fitted) -> CurveResult:
     """Return a fitted curve in words and numbers."""
     (name,) = curve.effects
-    kind, fitted = CURVES[name], getattr(curve.machine.effects, name)
-    return CurveResult(name, kind.what, kind.over, kind.balance, points(fitted), curve.rms)
+    found = getattr(curve.machine.effects, name)
+    return CurveResult(name, found.what, found.over, found.balance, found.table(), curve.rms)
 
 
 def _with_places(sheet: ActuatorSheet, name: str, visited: Array) -> ActuatorSheet:

@@ -21,7 +21,7 @@ from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
 from emir_plant.actuator import Actuator, ActuatorSheet, simulate
 from emir_plant.actuator.effects import KNOWN
-from emir_plant.actuator.model import field, run_each
+from emir_plant.actuator.model import column, run_each
 from emir_plant.actuator.model import record as flat_record
 
 STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
@@ -100,11 +100,11 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
     ]
     for effect in effects:
         kind = KNOWN[effect]
-        for name, about in quantities(kind).items():
-            if name not in kind.trial:
-                continue  # a curve's places: known
-            path = f"effects.{effect}.{name}"
-            found.append(_unknown(path, about.unit, kind.trial[name], about.low, about.high))
+        for name, trial in kind.trial.items():
+            about = quantities(kind)[name]
+            for place in [f".{k}" for k in range(about.count)] or [""]:
+                path = f"effects.{effect}.{name}{place}"
+                found.append(_unknown(path, about.unit, trial, about.low, about.high))
     return tuple(found)
 
 
@@ -137,15 +137,15 @@ class _Surplus:
         # how many samples a model's error takes to be another one
         self._lasting = max(1.0, slow / INDEPENDENT)
         self._stated = flat_record(sheet.machine)
-        self._places = [field(member.path) for member in members]
+        self._start = record.start
 
     def _errors(self, points: Array) -> Array:
         """Return simulated minus measured pressure, (m, n), at places, (m, k)."""
         machines = np.repeat(self._stated, len(points))
-        for place, member, column in zip(self._places, self.members, points.T, strict=True):
-            machines[place] = [member.value(float(x)) for x in column]
+        for member, place in zip(self.members, points.T, strict=True):
+            column(machines, member.path)[:] = [member.value(float(x)) for x in place]
         r = self._record
-        simulated = run_each(machines, r.opening, r.period, r.start)
+        simulated = run_each(machines, r.opening, r.period, self._start)
         return np.asarray(simulated[:, self._part] - self._measured)
 
     def rms(self, x: Array) -> float:
@@ -157,7 +157,7 @@ class _Surplus:
         return 0.5 * float(np.sum(((x - self.expected) / self.deviation) ** 2))
 
     def independent(self, rms: float) -> float:
-        """Return how many errors count as independent.
+        """Return how many errors count as independent at an rms error.
 
         All of the noise do, of what a model lacks one in a while; of both together those of a
         correlation that the noise makes smaller (Bartlett 1935).
@@ -225,8 +225,8 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
 
     noise: of the pressure. Starts are each known machine, effects that it lacks at their trial
     values, or with `levels` at all LEVELS of them; without any what is expected; and the best
-    `drawn` of places drawn from what is expected.
-    thorough: each of them is gone on from to the end.
+    `drawn` of places drawn from what is expected. The best ENDED after some steps are gone on from
+    to the end, `thorough` all.
     """
     members = unknowns(sheet, effects)
     surplus = _Surplus(sheet, members, record, noise, seen)
@@ -251,7 +251,6 @@ def _ended(
         rms = max(surplus.rms(best.x), surplus.exact)
         best = surplus.least(best.x, rms)
     curvature = best.jac.T @ best.jac  # of the logarithm of the probability
-    narrower = np.linalg.slogdet(surplus.deviation[:, None] * curvature * surplus.deviation)[1]
     values = {m.path: m.value(float(v)) for m, v in zip(surplus.members, best.x, strict=True)}
     return Fitted(
         effects,
@@ -260,8 +259,19 @@ def _ended(
         np.asarray(best.x),
         np.linalg.pinv(curvature, hermitian=True),
         surplus.rms(best.x),
-        -surplus.unexpected(best.x) - surplus.improbable(rms) - 0.5 * float(narrower),
+        -surplus.unexpected(best.x)
+        - surplus.improbable(rms)
+        - narrowed(best.jac, surplus.deviation),
     )
+
+
+def narrowed(jacobian: Array, deviation: Array) -> float:
+    """Return the logarithm of by how much data narrow what is known beforehand.
+
+    jacobian: (n + k, k) of `_Surplus`, deviation: (k,). By singular values: beside a run out of
+    all bounds the determinant of the square is 0 in rounding.
+    """
+    return float(np.sum(np.log(np.linalg.svd(jacobian * deviation, compute_uv=False))))
 
 
 def free_run(machine: Actuator, record: ActuatorRecord) -> Array:
@@ -306,17 +316,17 @@ def _starts(sheet: ActuatorSheet, members: Sequence[Unknown], known: Actuator) -
 
 def _place(members: Sequence[Unknown], known: Actuator, level: float = 1.0) -> Array:
     """Return a known machine's place, (k,), what it lacks at a level of its trial values."""
-    stated = declared(known)
+    stated = flat_record(known)
 
     def position(member: Unknown) -> float:
         group, effect, *_ = member.path.split(".")
         if group == "effects" and not getattr(known.effects, effect).is_on:
             return member.position(level * _trial(member.path))
-        return member.position(float(stated[member.path][1]))
+        return member.position(float(column(stated, member.path)[0]))
 
     return np.array([position(member) for member in members])
 
 
 def _trial(path: str) -> float:
-    _, effect, name = path.split(".")
+    _, effect, name, *_ = path.split(".")
     return KNOWN[effect].trial[name]

@@ -20,6 +20,7 @@ BREADTH = 3  # sets of effects that are followed at a time: the best first one m
 DRAWN = 3  # starts at random of a promising set
 DRAWN_ALONE = 8  # of a fit that knows of no other
 SETTLED = 8  # sets of which each starts once more from the others' machines
+MUCH = 0.7  # of the error without effects, on parts left out: half of its square
 BARE_MENTION = 0.5 * math.log(10.0)  # in the evidence: "barely worth mentioning" (Jeffreys 1961)
 
 Progress = Callable[[str], None]

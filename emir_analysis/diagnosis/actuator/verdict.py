@@ -2,12 +2,11 @@
 
 from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.fitting import Fitted
-from emir_analysis.diagnosis.actuator.search import Search
+from emir_analysis.diagnosis.actuator.search import MUCH, Search
 from emir_analysis.diagnosis.select import AT_NOISE
 from emir_plant.actuator import ActuatorSheet
 
 BALANCE = "oil"  # the only one that opening and pressure allow
-MUCH = 0.7  # of the error without effects, on parts left out: half of its square
 
 
 def verdict(sheet: ActuatorSheet, found: Search, noise: float) -> str:

@@ -8,16 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.disturbance import LoadChange, reloaded
-from emir_analysis.node_controls import CascadeControl, ForceLoopControl, Stepping, situation
+from emir_analysis.node_controls import CascadeControl, ForceLoopControl, situation
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.trajectory import AwayAndBack, TrajectoryInputs
 from emir_msgs_py.topics import (
-    CONTROL_PERIOD_NS,
+    CONTROL_PERIOD,
     CYLINDER_MOVE,
     CYLINDER_PREVIEW,
     CYLINDER_REFERENCE,
-    PLANT_PERIOD_NS,
+    PLANT_PERIOD,
+    TICKS,
     TRUTH,
 )
 from emir_plant.plant import Plant
@@ -25,9 +27,6 @@ from emir_plant.sensors import measure
 
 Array = NDArray[np.float64]
 
-TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
-PERIOD = CONTROL_PERIOD_NS * 1e-9
-PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
 REFERENCE_SIGNALS = (
     *CYLINDER_REFERENCE.fields, *CYLINDER_PREVIEW.fields, *CYLINDER_MOVE.fields,
 )  # fmt: skip
@@ -58,7 +57,7 @@ class ClosedLoop:
         changing = round(self.change.time / PLANT_PERIOD) if self.change else -1
         following = controlling = damping = None
         rows: dict[str, list[float]] = {}
-        last = round(duration / PERIOD) * TICKS
+        last = round(duration / CONTROL_PERIOD) * TICKS
         for tick in range(last + 1):
             if self.change and tick == changing:
                 plant, state = reloaded(plant, state, self.change.payload)
@@ -68,16 +67,18 @@ class ClosedLoop:
             if tick % TICKS == 0:
                 here = TrajectoryInputs(reading.stroke)
                 following = following or self.trajectory.initial(here)
-                preview = self.trajectory.ahead(following, len(CYLINDER_PREVIEW.fields), PERIOD)
-                move = self.trajectory.move(following, PERIOD)
-                following, reference = self.trajectory.step(following, here, PERIOD)
+                preview = self.trajectory.ahead(
+                    following, len(CYLINDER_PREVIEW.fields), CONTROL_PERIOD
+                )
+                move = self.trajectory.move(following, CONTROL_PERIOD)
+                following, reference = self.trajectory.step(following, here, CONTROL_PERIOD)
 
                 now = situation(reference, preview, reading, move)
-                controlling, wanted = self.outer.step(controlling, now, PERIOD)
+                controlling, wanted = self.outer.step(controlling, now, CONTROL_PERIOD)
 
                 signals = {name: now[name] for name in REFERENCE_SIGNALS}
                 if "velocity_command" in wanted:
-                    damping, valve = damped.step(damping, now | wanted, PERIOD)
+                    damping, valve = damped.step(damping, now | wanted, CONTROL_PERIOD)
                     signals |= valve
                 signals |= wanted
                 _append(rows, signals)

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
-from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl, Stepping
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.control_protocols import Stepping
+from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
@@ -20,8 +21,9 @@ from emir_control.pfc_file import SCHEDULED, STROKE, TIP_ANGLE
 from emir_control.scheduled_pfc import law_of
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, TICKS
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant, SimulationError
+from emir_plant.plant import REST_PRESSURE, Plant, SimulationError
 
 Array = NDArray[np.float64]
 Run = dict[str, Array]
@@ -29,7 +31,6 @@ Run = dict[str, Array]
 MOVING = 1e-4  # m/s of reference speed
 SETTLED = 1.0  # s after the stop
 STILL = 0.005  # m of dynamic deflection
-REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 
 
 def controllers(
@@ -218,7 +219,7 @@ def picture(runs: dict[str, Run]) -> Figure:
     figure = new_figure(7.0)
     velocity, deflection = figure.subplots(2, 1, sharex=True)
     first = next(iter(runs.values()))
-    control = np.arange(first["reference_velocity"].size) * PERIOD
+    control = np.arange(first["reference_velocity"].size) * CONTROL_PERIOD
     velocity.plot(control, first["reference_velocity"] * 1e3, color="0.5", label="wanted")
     for name, signals in runs.items():
         time = np.arange(signals["true_velocity"].size) * PLANT_PERIOD

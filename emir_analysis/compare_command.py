@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from emir_analysis import compare_grid, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.errors import IncompleteError, InputError
-from emir_analysis.node_controls import Stepping
 from emir_analysis.outputs import check_outputs, check_picture
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named

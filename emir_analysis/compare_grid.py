@@ -15,10 +15,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emir_analysis.compare import MoveFigures, direction, figures, moves, run
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.errors import InputError
 from emir_analysis.margin import gain_margin, linear_machine
-from emir_analysis.node_controls import Stepping
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities

@@ -10,25 +10,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from emir_analysis.design_pfc import (
-    DAMPED,
-    PERIOD,
-    OperatingPoint,
-    steady_motion,
-    velocity_model,
-)
+from emir_analysis.design_pfc import DAMPED, OperatingPoint, steady_motion, velocity_model
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant
+from emir_plant.plant import REST_PRESSURE, Plant
 
 Array = NDArray[np.float64]
 
 SLOW = 2.0  # Hz, above the oil spring's mode and below the first bending mode
 STANDSTILL = 10.0  # s
 SWING, LIFTED = 8.0, 0.7  # s
-REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 LIFTING = OperatingPoint(velocity=0.025)
 LITRES_PER_MINUTE = 6e4  # of 1 m^3/s
 
@@ -90,13 +84,13 @@ def swing(machine: Machine, leakage: float, force_loop: ForceLoopParameters) -> 
     plant, loop = Plant(with_values(machine, {LEAKAGE: leakage})), ForceLoop(force_loop)
     state = plant.initial(LIFTING.angle, REST_PRESSURE)
     shown, control, velocity = plant.outputs(state), None, []
-    for time in np.arange(0.0, SWING, PERIOD):
+    for time in np.arange(0.0, SWING, CONTROL_PERIOD):
         wanted = LIFTING.velocity if time < LIFTED else 0.0
         sensed = ForceLoopInputs(
             wanted, 0.0, shown.angle, shown.pressure_lifting, shown.pressure_lowering
         )
-        control, out = loop.step(control or loop.initial(sensed), sensed, PERIOD)
-        state, shown = plant.step(state, out.valve_command, PERIOD)
+        control, out = loop.step(control or loop.initial(sensed), sensed, CONTROL_PERIOD)
+        state, shown = plant.step(state, out.valve_command, CONTROL_PERIOD)
         velocity.append(shown.velocity)
     return np.array(velocity)
 
@@ -107,7 +101,7 @@ def picture(machine: Machine) -> Figure:
     velocity, height, oil = figure.subplots(3, 1, height_ratios=(3, 2, 2))
     for k, (name, (leakage, force_loop)) in enumerate(WAYS.items()):
         found = swing(machine, leakage, force_loop)
-        velocity.plot(np.arange(found.size) * PERIOD, found * 1e3, label=name, lw=1.2)
+        velocity.plot(np.arange(found.size) * CONTROL_PERIOD, found * 1e3, label=name, lw=1.2)
         plant = Plant(with_values(machine, {LEAKAGE: leakage}))
         rest = plant.initial(LIFTING.angle, REST_PRESSURE)
         angle = plant.simulate(rest, np.zeros(100), STANDSTILL / 100.0)[:, 0]

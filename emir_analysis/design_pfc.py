@@ -19,7 +19,7 @@ from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.prefilter import valve_command
 from emir_control.schedule import Schedule
 from emir_control.scheduled_pfc import law_of
-from emir_msgs_py.topics import CONTROL_PERIOD_NS
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant import core, linkage, operating_point
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
@@ -27,7 +27,6 @@ from emir_plant.plant import Plant, SimulationError
 
 Array = NDArray[np.float64]
 
-PERIOD = CONTROL_PERIOD_NS * 1e-9
 DAMPED = ForceLoopParameters()
 OUTPUTS = {"pfc": STROKE, "pfc_tip": TIP_ANGLE}  # by controller
 ORDERS = {STROKE: 6, TIP_ANGLE: 8}  # paper 3.3
@@ -90,8 +89,8 @@ def velocity_model(
     linear = linearize(plant, state, command)
     rows = dict(zip(core.Truth._fields, linear.C, strict=True))
     n = len(linear.A)
-    held = expm(PERIOD * np.block([[linear.A, linear.B], [np.zeros((1, n + 1))]]))
-    valve = InternalModel(held[:n, :n], held[:n, n], rows[output], PERIOD)
+    held = expm(CONTROL_PERIOD * np.block([[linear.A, linear.B], [np.zeros((1, n + 1))]]))
+    valve = InternalModel(held[:n, :n], held[:n, n], rows[output], CONTROL_PERIOD)
     ends = 0.99 * point.velocity, 1.01 * point.velocity
     low, high = (valve_command(v, force_loop.prefilter) for v in ends)
     return design.with_force_loop(

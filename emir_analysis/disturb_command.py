@@ -10,20 +10,21 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from emir_analysis.closed_loop import PLANT_PERIOD, TICKS, ClosedLoop
-from emir_analysis.compare import REST_PRESSURE, Run
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.compare import Run
 from emir_analysis.compare_command import save, select
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.disturbance import LoadChange, push
 from emir_analysis.limit import PAPER_MOVE
-from emir_analysis.node_controls import Stepping
 from emir_analysis.outputs import check_outputs, check_picture
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import EVERYDAY, controllers, turned_off
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.topics import PLANT_PERIOD, TICKS
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant, SimulationError
+from emir_plant.plant import REST_PRESSURE, Plant, SimulationError
 from emir_plant.sheet import joint1
 
 Array = NDArray[np.float64]

@@ -11,12 +11,11 @@ from emir_analysis.report import new_figure
 from emir_plant import core
 from emir_plant.boom import boom_modes, rigid_arm_joints, section_model
 from emir_plant.parameters import Geometry, Machine
-from emir_plant.plant import Plant
+from emir_plant.plant import REST_PRESSURE, Plant
 
 Array = NDArray[np.float64]
 
 FORTY_FIVE = math.radians(45.0)  # paper, Fig. 3
-REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 STEP_SIZE = 0.64  # of the valve, makes the boom swing
 SWING, PERIOD = 5.0, 5e-3  # s
 EXAGGERATION = 10.0  # of deflections in the picture

@@ -25,7 +25,7 @@ from emir_control.internal_model import InternalModel
 from emir_control.pfc_file import STROKE
 from emir_msgs_py.topics import (
     BOOM_DEFLECTION,
-    CONTROL_PERIOD_NS,
+    CONTROL_PERIOD,
     CYLINDER_STATES,
     JOINT_STATES,
     VELOCITY_COMMAND,
@@ -34,7 +34,6 @@ from emir_msgs_py.topics import (
 
 Array = NDArray[np.float64]
 
-PERIOD = CONTROL_PERIOD_NS * 1e-9
 SLOW = 0.97  # pole of the filter that takes slow changes off: 1 rad/s
 FIRST_POLE = 0.85  # where the iteration begins
 OUTERMOST = 0.98  # no pole beside the integrator is slower
@@ -66,8 +65,10 @@ def from_recording(bag: Path, output: str, order: int) -> Identified:
     given = recording["velocity_command"]
     if given.time[-1] - given.time[0] < SHORTEST:
         raise InputError(f"{bag}: {given.time[-1]:.1f} s: at least {SHORTEST:g} s are needed")
-    time = np.arange(given.time[0], given.time[-1], PERIOD)
-    command = given.value[np.searchsorted(given.time, time + 0.5 * PERIOD, side="right") - 1]
+    time = np.arange(given.time[0], given.time[-1], CONTROL_PERIOD)
+    command = given.value[
+        np.searchsorted(given.time, time + 0.5 * CONTROL_PERIOD, side="right") - 1
+    ]
     names = ("stroke",) if output == STROKE else ("angle", "deflection")
     shown = sum(np.interp(time, recording[name].time, recording[name].value) for name in names)
     try:
@@ -84,7 +85,7 @@ def _sources(bag: Path, topic: Topic, there: set[str]) -> dict[str, Source]:
 
 
 def identify(command: Array, output: Array, order: int) -> Identified:
-    """Return the model of an order from samples of command and output, (n,) each, PERIOD apart.
+    """Return the model of an order from command and output, (n,) each, a control period apart.
 
     Raises InputError where nothing moves, ParameterError for an order below 2.
     """
@@ -104,7 +105,7 @@ def identify(command: Array, output: Array, order: int) -> Identified:
     assert best is not None  # noqa: S101 (there were rounds)
     error, poles, zeros = best
     companion = linalg.companion(np.convolve(poles, [1.0, -1.0]))  # the integrator put back
-    model = InternalModel(companion, np.eye(order)[0], zeros, PERIOD)
+    model = InternalModel(companion, np.eye(order)[0], zeros, CONTROL_PERIOD)
     return Identified(design.reduced(model, order), 1.0 - error / float(np.std(wanted)))
 
 

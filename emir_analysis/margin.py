@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.design_pfc import PERIOD, OperatingPoint, steady_motion, velocity_model
-from emir_analysis.node_controls import Stepping, situation
+from emir_analysis.control_protocols import Stepping
+from emir_analysis.design_pfc import OperatingPoint, steady_motion, velocity_model
+from emir_analysis.node_controls import situation
 from emir_common.parameter_tree import with_values
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import PREVIEW
 from emir_control.trajectory import Reference
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant.core import Truth
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
@@ -78,7 +80,7 @@ def gain_margin(linear: LinearMachine, outer: Stepping) -> float:
         (linear.at.stroke,) * PREVIEW,
         linear.measured(np.zeros(linear.model.order)),
     )
-    if "velocity_command" not in outer.step(None, begin, PERIOD)[1]:
+    if "velocity_command" not in outer.step(None, begin, CONTROL_PERIOD)[1]:
         return math.nan
     low, high = -math.log(WIDEST), math.log(WIDEST)
     if dies_out(linear, outer, WIDEST):
@@ -103,7 +105,7 @@ def dies_out(linear: LinearMachine, outer: Stepping, factor: float) -> bool:
             return False
         now = situation(reference, preview, linear.measured(x))
         signals: dict[str, Any]
-        state, signals = outer.step(state, now, PERIOD)
+        state, signals = outer.step(state, now, CONTROL_PERIOD)
         push = PUSH if k < PUSHED else 0.0
         x = linear.model.next(x, factor * (signals["velocity_command"] + push))
     middle, end = moved[WATCHED // 4 : WATCHED // 2], moved[-WATCHED // 4 :]

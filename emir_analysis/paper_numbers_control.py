@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis import limit
-from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD
 from emir_analysis.compare import MoveFigures, Run, controllers, dynamic_deflection, figures, run
 from emir_analysis.damping import LITRES_PER_MINUTE, UNDAMPED, damping_figures
 from emir_analysis.design_pfc import ORDERS, OperatingPoint, velocity_model
@@ -20,6 +19,7 @@ from emir_control.internal_model import InternalModel
 from emir_control.pfc import PREVIEW
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD
 from emir_plant import core, linkage
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
@@ -94,7 +94,7 @@ def _tcp_error(machine: Machine, signals: Run) -> Array:
     """Return the TCP's error, m, against where the reference wanted it LAG ago."""
     time = np.arange(signals["true_angle"].size) * PLANT_PERIOD
     reference = signals["reference_stroke"]
-    wanted = np.interp(time - LAG, np.arange(reference.size) * PERIOD, reference)
+    wanted = np.interp(time - LAG, np.arange(reference.size) * CONTROL_PERIOD, reference)
     p = Plant(machine).record[0]
     angles = np.array([linkage.angle(stroke, p) for stroke in wanted])
     turned = machine.geometry.boom_length * (signals["true_angle"] - angles)

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from emir_analysis.closed_loop import PERIOD
 from emir_analysis.figure_flow import NORMAL, SUPPLIES, flow_curves
 from emir_analysis.figure_steps import (
     ANGLES,
@@ -24,18 +23,18 @@ from emir_analysis.figure_steps import (
 )
 from emir_analysis.paper_number import Number, is_about, judged
 from emir_common.parameter_tree import with_values
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant import core, linkage
 from emir_plant.boom import section_model
 from emir_plant.core import Truth
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant, SimulationError
+from emir_plant.plant import REST_PRESSURE, Plant, SimulationError
 from emir_plant.sensors import resolver
 from emir_plant.transfer import mechanics
 
 BAR = 1e5
 FORTY_FIVE, SEVENTY_FIVE = math.radians(45.0), math.radians(75.0)
-REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 PAYLOAD = 1500.0  # kg, paper 1
 STRONGEST = 320e5  # Pa, paper 2.2: the pump's highest pressure
 RIGID = {"geometry.section_spring": 1e12}  # N m/rad, as stiff as the range allows
@@ -62,8 +61,8 @@ def measure(machine: Machine, steps: StepResponses) -> list[Number]:
         _logic_block(machine),
         *_steps(steps),
         _resolver(machine),
-        Number(13, "sampling", "32 ms", f"{PERIOD * 1e3:g} ms", "period of the control loop",
-               judged(math.isclose(PERIOD, 0.032))),
+        Number(13, "sampling", "32 ms", f"{CONTROL_PERIOD * 1e3:g} ms",
+               "period of the control loop", judged(math.isclose(CONTROL_PERIOD, 0.032))),
     ]  # fmt: skip
 
 

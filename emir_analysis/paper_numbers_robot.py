@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from emir_analysis.paper_number import NOT_MEASURED, Number, judged
 from emir_plant.core import Truth
 from emir_plant.linearize import linearize
-from emir_plant.plant import Plant
+from emir_plant.plant import REST_PRESSURE, Plant
 from emir_plant.transfer import mechanics
 
 Array = NDArray[np.float64]
 
 FORTY_FIVE = math.radians(45.0)
-REST_PRESSURE = 2e6  # Pa, of the lowering chamber
 CLOSE = 0.05  # share within which the robot counts as the same
 PERIOD = 8e-3  # s
 RIGID = 0.1  # Hz, below which a mode is the rigid one, which only the weight holds

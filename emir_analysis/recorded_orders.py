@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from emir_analysis import bags
+from emir_analysis.control_protocols import Signals
 from emir_analysis.errors import InputError
 from emir_analysis.info import CHANGE
-from emir_analysis.node_controls import Signals
 from emir_analysis.run_signals import full_name_of
 from emir_analysis.switching import Choosing
 from emir_control.waypoints import Waypoints

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from emir_analysis import bags
+from emir_analysis.control_protocols import NodeControl, Signals, Stepping
 from emir_analysis.errors import InputError
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
@@ -17,11 +18,8 @@ from emir_analysis.node_controls import (
     ForceLoopControl,
     LqgControl,
     MpcControl,
-    NodeControl,
     PfcControl,
     PfcTipControl,
-    Signals,
-    Stepping,
     TrajectoryControl,
 )
 from emir_analysis.parameter_files import unpacked

@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals, Topics, signals_of
+from emir_analysis.control_protocols import Signals, Topics
+from emir_analysis.node_controls import signals_of
 from emir_analysis.robot_setup import RobotForceLoopParameters
 from emir_control.cascade import Cascade, CascadeInputs
 from emir_control.drive_loop import DriveLoop, DriveLoopInputs

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import NodeControl, Signals
+from emir_analysis.control_protocols import NodeControl, Signals
 from emir_analysis.robot_controls import pose_signals
 from emir_msgs_py.robot_topics import (
     ROBOT_VALVE_COMMAND,
@@ -17,20 +17,16 @@ from emir_msgs_py.robot_topics import (
     TRUE_QUANTITIES,
     of_joints,
 )
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, TICKS
 from emir_plant.robot.plant import RobotPlant, RobotTruth
 from emir_plant.robot.sensors import RobotMeasurement, measure
 
 Array = NDArray[np.float64]
 
-TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS
-PERIOD = CONTROL_PERIOD_NS * 1e-9
-PLANT_PERIOD = PLANT_PERIOD_NS * 1e-9
-
 
 def period(control: NodeControl) -> float:
     """Return a control's period, s: that of what it gives."""
-    return PLANT_PERIOD if control.outputs[0].every == "plant" else PERIOD
+    return PLANT_PERIOD if control.outputs[0].every == "plant" else CONTROL_PERIOD
 
 
 def commands(signals: Signals) -> Array:
@@ -72,7 +68,7 @@ class RobotLoop:
         states: list[Any] = [None] * len(self.controls)
         rows: dict[str, list[float]] = {}
         signals: Signals = {}  # those of the controllers last till the next
-        last = round(duration / PERIOD) * TICKS
+        last = round(duration / CONTROL_PERIOD) * TICKS
         for tick in range(last + 1):
             new = sensor_signals(self.plant, truth, tick)
             for k, control in enumerate(self.controls):

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from emir_analysis.control_protocols import NodeControl, Signals
 from emir_analysis.errors import InputError
-from emir_analysis.node_controls import NodeControl, Signals
 from emir_analysis.recorded_orders import Obedience, orders
 from emir_analysis.robot_controls import (
     RobotCascadeControl,

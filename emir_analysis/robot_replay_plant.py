@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals
+from emir_analysis.control_protocols import Signals
 from emir_analysis.replay_plant import check_recorded, check_start, finite, number
-from emir_analysis.robot_machine import PLANT_PERIOD, commands, sensor_signals
+from emir_analysis.robot_machine import commands, sensor_signals
 from emir_analysis.robot_setup import Posture
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS, ROBOT_VALVE_COMMAND
-from emir_msgs_py.topics import PLANT_PERIOD_NS
+from emir_msgs_py.topics import PLANT_PERIOD, PLANT_PERIOD_NS
 from emir_plant.plant import SimulationError
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.reach import PostureError

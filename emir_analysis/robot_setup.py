@@ -23,7 +23,7 @@ from emir_control.pfc import PfcParameters
 from emir_control.robot_trajectory import LineParameters, RobotTrajectory, Supply
 from emir_control.trajectory import TrajectoryParameters
 from emir_control.waypoints import Direct, Linkage
-from emir_msgs_py.topics import CONTROL_PERIOD_NS
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant.parameters import Machine
 from emir_plant.robot import linkage
 from emir_plant.robot.actuators import machines
@@ -38,7 +38,6 @@ Array = NDArray[np.float64]
 GAIN = 0.7  # 1/s, k_p of law (11)
 LAG = 0.05  # s, T of law (11): command held for a period, force loop's period, spool, resolver
 RESPONSE = 3.0  # s, T_CLRT of (12): a gain of 0.74 1/s towards a set point 20 periods ahead
-PERIOD = CONTROL_PERIOD_NS * 1e-9  # s
 ENDLESS = (-5.0, 5.0)  # rad, the base
 HIGH_PASS = 3.0  # s, T_H of (10)
 DAMPING_RATE = 3.0  # 1/s, at which the force loop lets a cylinder's oil relax
@@ -121,8 +120,8 @@ def pfc_parameters() -> PfcParameters:
     each other no model of one of them tells. So the model error is taken to stay as it is now (its
     mean over 32 samples would come half a second late), and the response is the cascade's.
     """
-    late = np.array([[1.0, PERIOD], [0.0, 0.0]])  # stroke, and the command that acts next
-    model = InternalModel(late, np.array([0.0, 1.0]), np.array([1.0, 0.0]), PERIOD)
+    late = np.array([[1.0, CONTROL_PERIOD], [0.0, 0.0]])  # stroke, and the command that acts next
+    model = InternalModel(late, np.array([0.0, 1.0]), np.array([1.0, 0.0]), CONTROL_PERIOD)
     return PfcParameters(model=model, response_time=RESPONSE, error_degree=0, error_window=1)
 
 

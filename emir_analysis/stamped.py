@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis import bags, columns
+from emir_analysis.control_protocols import Signals
 from emir_analysis.errors import InputError, listed
-from emir_analysis.node_controls import Signals
 from emir_analysis.run_signals import full_name
 from emir_msgs_py.topics import Topic
 

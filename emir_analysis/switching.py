@@ -11,13 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from emir_analysis.node_controls import (
-    NodeControl,
-    PlansMoves,
-    Signals,
-    Switchable,
-    Topics,
-)
+from emir_analysis.control_protocols import NodeControl, PlansMoves, Signals, Switchable, Topics
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (
     OFFERED_COMMANDS,

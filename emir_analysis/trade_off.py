@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from emir_analysis.compare import figures, run
-from emir_analysis.node_controls import CascadeControl, Stepping
+from emir_analysis.control_protocols import Stepping
+from emir_analysis.node_controls import CascadeControl
 from emir_analysis.report import new_figure
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.trajectory import TrajectoryParameters, named

@@ -16,8 +16,9 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.closed_loop import PERIOD, PLANT_PERIOD, TICKS, ClosedLoop
-from emir_analysis.compare import REST_PRESSURE, Run, dynamic_deflection
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.compare import Run, dynamic_deflection
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.limit import PAPER_MOVE, Move, least
 from emir_analysis.machine_model import actuator, boom_table
 from emir_analysis.node_controls import (
@@ -27,7 +28,6 @@ from emir_analysis.node_controls import (
     PfcControl,
     PfcTipControl,
     ShapedControl,
-    Stepping,
 )
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
@@ -40,9 +40,10 @@ from emir_control.regulator import RegulatorParameters
 from emir_control.shaping import ShapedCascade, ShapedParameters, Shaper
 from emir_control.tip import Tip
 from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, TICKS
 from emir_plant import linkage
 from emir_plant.parameters import Machine
-from emir_plant.plant import Plant, SimulationError
+from emir_plant.plant import REST_PRESSURE, Plant, SimulationError
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ class Range:
     edges: tuple[float, float] = (0.7, 1.3)
     friction: tuple[float, float] = (0.0, 7e3)
     hysteresis: float = 0.01
-    delay: float = PERIOD
+    delay: float = CONTROL_PERIOD
     supply: float = 320e5
     threshold: float = 40e5
     directions: tuple[int, ...] = (1, -1)

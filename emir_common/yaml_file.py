@@ -12,8 +12,14 @@ from emir_common.quantity import ParameterError
 class _Loader(yaml.SafeLoader):
     """YAML in which no key of a map stands twice: the first would be lost without a word.
 
-    And in which 2e7 is a number as it is for ROS and by YAML 1.2; the library wants 2.0e+7.
+    And in which 2e7 is a number as it is for ROS and by YAML 1.2; the library wants 2.0e+7. An
+    anchor that holds itself is refused: what reads it would never come to an end.
     """
+
+    def __init__(self, stream: str) -> None:
+        """Construct every value whole, in which the library notices one that holds itself."""
+        super().__init__(stream)
+        self.deep_construct = True
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:  # noqa: FBT001, FBT002 (as in the library)
         """Return the map. Raises ConstructorError for a key that stands twice."""

@@ -18,6 +18,8 @@ Quality = Literal["sensor", "command"]
 
 PLANT_PERIOD_NS = 8_000_000  # sensors, four times a control period
 CONTROL_PERIOD_NS = 32_000_000  # paper 3.2
+PLANT_PERIOD, CONTROL_PERIOD = PLANT_PERIOD_NS * 1e-9, CONTROL_PERIOD_NS * 1e-9  # s
+TICKS = CONTROL_PERIOD_NS // PLANT_PERIOD_NS  # plant periods in a control period
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from emir_plant.parameters import Machine
 from emir_plant.record import record
 from emir_plant.unnamed import force as unnamed_force
 
+REST_PRESSURE = 2e6  # Pa, p_S of the boom at rest where nothing else is asked for
+
 
 class SimulationError(RuntimeError):
     """The simulation left the range in which the model means anything."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from emir_analysis.node_controls import CascadeControl, Stepping
+from emir_analysis.node_controls import CascadeControl
 from emir_analysis.robot_controls import RobotCascadeControl
 from emir_analysis.robot_setup import cascade_parameters
 from emir_control.cascade import Cascade, CascadeParameters
@@ -27,7 +27,7 @@ class CascadeNode(ControlNode):
 
         def tune(parameters: CascadeParameters) -> None:
             law = Cascade(parameters)
-            self.law: Stepping = six(law) if robot else self.standing_by(mine(law))
+            self.law = six(law) if robot else self.standing_by(mine(law))
 
         tune(parameters)
         LiveParameters(self, parameters, LIVE, tune)

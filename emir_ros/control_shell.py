@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from emir_analysis.node_controls import NodeControl, Signals, Stepping
+from emir_analysis.control_protocols import NodeControl, Signals, Stepping
 from emir_analysis.switching import Ready
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (

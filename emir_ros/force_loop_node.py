@@ -3,12 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from emir_analysis.node_controls import (
-    ForceLoopControl,
-    NodeControl,
-    Signals,
-    force_loop_signals,
-)
+from emir_analysis.control_protocols import NodeControl, Signals
+from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
 from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters

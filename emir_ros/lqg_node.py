@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import ClassVar
 
+from emir_analysis.control_protocols import Signals
 from emir_analysis.machine_model import lqg_parameters
-from emir_analysis.node_controls import LqgControl, Signals
+from emir_analysis.node_controls import LqgControl
 from emir_control.lqg import Lqg
 from emir_plant.sheet import joint1
 from emir_ros.control_shell import ControlNode

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from rclpy.node import Node
 
-from emir_analysis.node_controls import Signals
+from emir_analysis.control_protocols import Signals
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import GROUND, ROBOT_VALVE_COMMAND

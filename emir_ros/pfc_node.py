@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from emir_analysis.node_controls import PfcControl, Stepping
+from emir_analysis.node_controls import PfcControl
 from emir_analysis.robot_controls import RobotPfcControl
 from emir_analysis.robot_setup import pfc_parameters
 from emir_control.pfc import Pfc, PfcParameters
@@ -30,9 +30,7 @@ class PfcNode(ControlNode):
             parameters = declare_pfc(self, STROKE, LIVE)
 
         def tune(parameters: PfcParameters) -> None:
-            self.law: Stepping = (
-                six(Pfc(parameters)) if robot else self.standing_by(mine(law_of(parameters)))
-            )
+            self.law = six(Pfc(parameters)) if robot else self.standing_by(mine(law_of(parameters)))
 
         tune(parameters)
         LiveParameters(self, parameters, LIVE, tune)

@@ -11,7 +11,7 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Header
 
-from emir_analysis.node_controls import Signals
+from emir_analysis.control_protocols import Signals
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS
 from emir_msgs_py.topics import (
@@ -21,6 +21,7 @@ from emir_msgs_py.topics import (
     RECORDED,
     ROBOT,
 )
+from emir_plant.plant import REST_PRESSURE
 from emir_ros import qos
 from emir_ros.diagnostics import Beat, Level, pressures
 from emir_ros.machines import Joint1Machine, Machine, RobotMachine
@@ -35,7 +36,7 @@ class PlantNodeParameters:
     """How the machine starts and how long it runs."""
 
     initial_pressure_lowering: float = quantity(
-        "Pa", 0.0, 3e7, "p_S at the start; p_H follows from the load", default=2e6
+        "Pa", 0.0, 3e7, "p_S at the start; p_H follows from the load", default=REST_PRESSURE
     )
     duration: float = quantity("s", 0.0, 1e6, "simulated time; 0: without end", default=0.0)
     command_timeout: float = quantity(

@@ -12,7 +12,8 @@ import numpy as np
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from emir_analysis.node_controls import Guidable, TrajectoryControl
+from emir_analysis.control_protocols import Guidable
+from emir_analysis.node_controls import TrajectoryControl
 from emir_analysis.recorded_orders import FOLLOW, as_values
 from emir_analysis.robot_controls import RobotTrajectoryControl
 from emir_analysis.robot_setup import path_parameters, trajectory
@@ -41,13 +42,14 @@ class TrajectoryNode(ControlNode):
     the named trajectory's place.
     """
 
+    law: Guidable
+
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         mine, six = TrajectoryControl, RobotTrajectoryControl
         super().__init__("trajectory_node", mine.inputs, mine.outputs, arguments, six)
         known = "lift-lower, lower-lift or hold; of the whole robot also line"
         name: str = declare(self, "trajectory", "lift-lower", known)
         move = declare_tree(self, TrajectoryParameters())
-        self.law: Guidable
         with naming(self):
             if self.model == ROBOT:
                 sheet = declare_robot(self)

@@ -14,13 +14,12 @@ import numpy as np
 from emir_analysis.bench.quadratic_program import Problem, Query, by_do_mpc, by_osqp
 from emir_analysis.bench.timing import Figure
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.compare import REST_PRESSURE
 from emir_analysis.yardstick import controllers
 from emir_control import pfc_file
 from emir_control.force_loop import ForceLoop, ForceLoopParameters
 from emir_control.pfc_file import STROKE
 from emir_control.trajectory import TrajectoryParameters, named
-from emir_plant.plant import Plant
+from emir_plant.plant import REST_PRESSURE, Plant
 from emir_plant.sheet import joint1
 
 DURATION = 10.0  # s: rest, a move, rest, and the greater part of the move back

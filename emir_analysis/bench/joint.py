@@ -27,7 +27,7 @@ from emir_analysis.bench.timing import Contender, Figure, durations, rates
 from emir_plant import core, lanes
 from emir_plant.core import LOGIC, MODES, P_H, P_S, SPOOL, Truth
 from emir_plant.jit import compiled
-from emir_plant.plant import Plant
+from emir_plant.plant import REST_PRESSURE, Plant
 from emir_plant.sheet import joint1
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Task:
     @cached_property
     def start(self) -> Array:
         """The state at the start."""
-        return self.plant.initial(np.pi / 4, 2e6)
+        return self.plant.initial(np.pi / 4, REST_PRESSURE)
 
     @cached_property
     def small_start(self) -> Array:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.node_controls import Signals
+from emir_analysis.control_protocols import Signals
 from emir_control.pfc import PREVIEW, PfcParameters, PfcState
 from emir_msgs_py.topics import CYLINDER_PREVIEW
 

@@ -9,7 +9,6 @@ import pytest
 from emir_analysis.cli import main
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.design_pfc import (
-    PERIOD,
     DesignTask,
     OperatingPoint,
     design_pfc,
@@ -25,6 +24,7 @@ from emir_control.design import spectral_radius
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopParameters
 from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant import core
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sheet import joint1
@@ -69,8 +69,8 @@ def test_design_model_answers_a_small_step_as_the_nonlinear_machine_does(
                 0.02 + step, 0.0, 0.0, shown.pressure_lifting, shown.pressure_lowering
             )
             control = control or loop.initial(sensed, 0.02)
-            control, out = loop.step(control, sensed, PERIOD)
-            state, shown = plant.step(state, out.valve_command, PERIOD)
+            control, out = loop.step(control, sensed, CONTROL_PERIOD)
+            state, shown = plant.step(state, out.valve_command, CONTROL_PERIOD)
         return np.array(found)
 
     model = velocity_model(joint1(), point, output)

@@ -7,17 +7,19 @@ import numpy as np
 import pytest
 
 from emir_analysis.cli import main
-from emir_analysis.closed_loop import TICKS, ClosedLoop
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.control_protocols import Stepping
 from emir_analysis.design_pfc import DesignTask, OperatingPoint, designed, velocity_model
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, identify
-from emir_analysis.node_controls import CascadeControl, PfcControl, Stepping
+from emir_analysis.node_controls import CascadeControl, PfcControl
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.design import spectral_radius
 from emir_control.internal_model import InternalModel
 from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.topics import TICKS
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 

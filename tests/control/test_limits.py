@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emir_analysis.closed_loop import PERIOD, ClosedLoop
+from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.control_protocols import Signals, Stepping
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
     LqgControl,
     PfcControl,
     PfcTipControl,
-    Signals,
-    Stepping,
     situation,
 )
 from emir_common.quantity import ParameterError
@@ -27,7 +26,7 @@ from emir_control.pfc import Pfc
 from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.tip import Tip
 from emir_control.trajectory import NO_MOVE, Reference, TrajectoryParameters, named
-from emir_msgs_py.topics import CYLINDER_REFERENCE
+from emir_msgs_py.topics import CONTROL_PERIOD, CYLINDER_REFERENCE
 from emir_plant import linkage
 from emir_plant.plant import Plant
 from emir_plant.sensors import Measurement
@@ -100,7 +99,7 @@ def test_wild_commands_are_limited_in_size_and_change() -> None:
     allowed = run["wanted_velocity"] + run["force_feedback"]
     assert np.abs(allowed).max() <= LIMITS.speed * (1 + 1e-12)
     steps = np.diff(allowed, prepend=0.0)
-    assert np.abs(steps).max() == pytest.approx(LIMITS.acceleration * PERIOD, rel=1e-9)
+    assert np.abs(steps).max() == pytest.approx(LIMITS.acceleration * CONTROL_PERIOD, rel=1e-9)
     assert np.abs(run["valve_command"]).max() <= 1.0
 
 
@@ -144,10 +143,10 @@ def test_a_controller_begun_without_a_number_begins_with_the_first(name: str, lo
         if lost == "stroke"
         else good | dict.fromkeys(CYLINDER_REFERENCE.fields, math.nan)
     )
-    control, signals = outer.step(None, bad, PERIOD)
+    control, signals = outer.step(None, bad, CONTROL_PERIOD)
     assert signals["velocity_command"] == 0.0
     for _ in range(3):
-        control, signals = outer.step(control, good, PERIOD)
+        control, signals = outer.step(control, good, CONTROL_PERIOD)
         assert signals["velocity_command"] == pytest.approx(0.0, abs=1e-9)
 
 
@@ -195,5 +194,5 @@ def test_lqg_is_held_off_the_end_whatever_it_wants() -> None:
     inputs = LqgInputs(reading.stroke, NO_MOVE, *reading[:1], *reading[2:4], reading.deflection)
     held = law.initial(inputs)
     angle = linkage.angle(LIMITS.stroke_high, plant.record[0])
-    _, outputs = law.step(held, inputs._replace(reference=2.0, angle=angle), PERIOD)
+    _, outputs = law.step(held, inputs._replace(reference=2.0, angle=angle), CONTROL_PERIOD)
     assert outputs.wanted <= 0.0

@@ -8,17 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emir_analysis.closed_loop import TICKS, ClosedLoop
+from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.compare import dynamic_deflection
+from emir_analysis.control_protocols import NodeControl, Switchable
 from emir_analysis.machine_model import lqg_parameters
-from emir_analysis.node_controls import (
-    CascadeControl,
-    LqgControl,
-    NodeControl,
-    PfcControl,
-    PfcTipControl,
-    Switchable,
-)
+from emir_analysis.node_controls import CascadeControl, LqgControl, PfcControl, PfcTipControl
 from emir_analysis.switching import Ready, Selector, Switch, SwitchedLoop
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -29,6 +23,7 @@ from emir_control.pfc_file import STROKE, TIP_ANGLE
 from emir_control.prefilter import PrefilterParameters, commanded_velocity
 from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
+from emir_msgs_py.topics import TICKS
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 

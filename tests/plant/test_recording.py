@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emir_analysis.closed_loop import PLANT_PERIOD
 from emir_analysis.run_signals import load_run
-from emir_msgs_py.topics import TRUTH
+from emir_msgs_py.topics import PLANT_PERIOD, TRUTH
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 

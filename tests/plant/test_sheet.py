@@ -45,6 +45,7 @@ def test_every_number_of_the_machine_has_a_source() -> None:
         ),
         ("cylinder:", "cylinder: [", "not YAML"),
         ("cylinder:", "cylinder: {}\ncylinder:", "cylinder stands twice"),
+        ("cylinder:", "colour: &it {of: *it}\ncylinder:", "not YAML: found unconstructable recurs"),
         ("beta: {value: 5.0e+8", "beta: {tol: 15%, value: 5.0e+8", "tol = '15%': not a number"),
         ("beta: {value: 5.0e+8", "beta: {tol: , value: 5.0e+8", "tol = None: not a number"),
         ("beta: {value: 5.0e+8", "beta: {tol: 15, value: 5.0e+8", "tol = 15: a relative one"),

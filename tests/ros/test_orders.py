@@ -23,14 +23,13 @@ from emir_analysis.rosbag2_writer import Rosbag2Writer
 from emir_analysis.run_signals import load_run
 from emir_analysis.stamped import same
 from emir_analysis.switching import Switch
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, ROBOT
+from emir_msgs_py.topics import CONTROL_PERIOD, CONTROL_PERIOD_NS, ROBOT
 from emir_ros.graph import Plan, ros_arguments
 from emir_ros.main import make_executor
 from emir_ros.run import _node_class
 
 pytestmark = pytest.mark.usefixtures("ros")
 
-PERIOD = CONTROL_PERIOD_NS * 1e-9
 AT_REST = 1e-6  # m/s
 
 
@@ -134,7 +133,7 @@ def test_orders_and_settings_replay_bit_for_bit(
     assert [order.what for order in given] == ["hold", "follow", "stop", "start"]
     assert all(order.stamp % CONTROL_PERIOD_NS == 0 for order in given)
     for order, earliest in zip(given, (2.2, 4.0, 5.0, 6.4), strict=True):
-        assert earliest < order.stamp * 1e-9 <= earliest + 2.5 * PERIOD
+        assert earliest < order.stamp * 1e-9 <= earliest + 2.5 * CONTROL_PERIOD
     recorded = load_run(bag)["reference_velocity"]
     stopped = (recorded.time > given[2].stamp * 1e-9 + 0.8) & (recorded.time < 6.4)
     assert np.abs(recorded.value[stopped]).max() < AT_REST

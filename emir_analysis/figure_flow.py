@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from emir_analysis.report import new_figure
 from emir_plant.hydraulics import valve
-from emir_plant.hydraulics.flows import Pressures, lifting_flows
+from emir_plant.hydraulics.flows import Edges, Pressures, lifting_flows
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 
@@ -90,7 +90,7 @@ def stationary(machine: Machine, force: float, supply: float, current: float) ->
 
     def both(pressure: float) -> tuple[float, float]:
         against = (force + pressure * low) / high
-        return lifting_flows(opening, Pressures(supply, against, pressure), p)
+        return lifting_flows(Edges(opening, opening), Pressures(supply, against, pressure), p)
 
     def surplus(pressure: float) -> float:
         inflow, outflow = both(pressure)

@@ -42,6 +42,7 @@ MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 SETTLING = 2.0  # of play and oil in a step; Runge-Kutta 4 is unstable above 2.8
+FASTEST = 0.3  # m/s: at most so fast play and piston move while the oil is compressed
 FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging
 
 
@@ -113,11 +114,11 @@ def _valve_flows(x: Array, stroke: float, p: Any) -> tuple[float, float, float]:
 
     stroke: of the piston, m.
     """
-    edges = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
-    opening = terms.opening(valve.opening(edges, p), x[TIME], stroke, p)
+    position = valve_hysteresis.edges(x[SPOOL], x[EDGES], p)
+    edges = terms.edges(valve.opening(position, p), x[TIME], stroke, p)
     pressures = Pressures(p.p0 - x[DROOP], x[P_H], x[P_S])
-    lifting, lowering = flows(opening, pressures, x[LOGIC], p)
-    return lifting, lowering, delivered(opening, lifting, lowering)
+    lifting, lowering = flows(edges, pressures, x[LOGIC], p)
+    return lifting, lowering, delivered(edges, lifting, lowering)
 
 
 @compiled
@@ -192,9 +193,11 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
     n = p.mode_joint.size
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
     unnamed = unnamed_force.along(motion.joint_velocity, motion.stroke, p)
-    torque = (motion.force + unnamed - friction) * motion.arm
-    gravity = math.cos(motion.angle)
     load = external_load.force(x[TIME], p)
+    beside = unnamed + external_load.on_piston(load, p)
+    torque = (motion.force + beside - friction) * motion.arm
+    gravity = math.cos(motion.angle)
+    across = external_load.at_tip(load, p)
     for i in range(n):
         dx[MODES + i] = x[MODES + n + i]
         dx[MODES + n + i] = (
@@ -202,7 +205,7 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
             - p.mode_weight[i] * gravity
             - p.mode_stiffness[i] * x[MODES + i]
             - p.mode_damping[i] * x[MODES + n + i]
-            + p.mode_tip[i] * load
+            + p.mode_tip[i] * across
         )
 
 
@@ -220,7 +223,7 @@ def truth_of(x: Array, p: Any) -> Truth:
     bending = 0.0
     for i in range(p.mode_deflection.size):
         bending += p.mode_deflection[i] * x[MODES + i]
-    load = external_load.force(x[TIME], p)
+    load = external_load.at_tip(external_load.force(x[TIME], p), p)
     return Truth(
         motion.angle,
         motion.tip_angle,
@@ -254,7 +257,7 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
 ) -> None:
     """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
     p = parameters[0]
-    steps = max(1, math.ceil(dt / min(step, _settling_step(x, p)) - 1e-9))
+    steps = max(1, math.ceil(dt / min(step, _settling_step(x, dt, p)) - 1e-9))
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
@@ -265,18 +268,23 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
 
 
 @compiled_in_place
-def _settling_step(x: Array, p: Any) -> float:
-    """Return the longest step, s, that follows how play and oil settle; infinite without play."""
+def _settling_step(x: Array, dt: float, p: Any) -> float:
+    """Return the longest step, s, that follows how play and oil settle; infinite without play.
+
+    Where the force of the oil may come to within a dt, s, they settle fastest nearest to 0.
+    """
     if p.backlash_gap == 0.0:
         return math.inf
-    stroke = _motion(x, p).stroke
+    motion = _motion(x, p)
+    stroke = motion.stroke
     volume = chambers.volume_lifting(stroke, p)
     oil = terms.stiffness_lifting(x[P_H], volume, p)
     stiffness = oil * p.area_lifting**2 / volume
     volume = chambers.volume_lowering(stroke, p)
     oil = terms.stiffness_lowering(x[P_S], volume, p)
     stiffness += oil * p.area_lowering**2 / volume
-    return SETTLING / backlash.settling_rate(stiffness, p)
+    nearest = max(abs(motion.force) - stiffness * FASTEST * dt, 0.0)
+    return SETTLING / backlash.settling_rate(stiffness, nearest, p)
 
 
 @compiled_in_place

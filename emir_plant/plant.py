@@ -60,9 +60,11 @@ class Plant:
                 f" {math.degrees(lowest):.1f} ... {math.degrees(highest):.1f} deg"
             )
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
-        load = p["mode_weight"] * math.cos(angle) - p["mode_tip"] * external_load.force(0.0, p)
+        outside = external_load.force(0.0, p)
+        load = p["mode_weight"] * math.cos(angle)
+        load -= p["mode_tip"] * external_load.at_tip(outside, p)
         torque = load[0] / p["mode_joint"][0]
-        force = torque / linkage_error.lever_arm(angle, p)
+        force = torque / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
         force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)
         high = (force + low * p["area_lowering"]) / p["area_lifting"]
         if not 0.0 <= high <= p["p0"]:

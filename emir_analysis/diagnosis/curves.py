@@ -38,12 +38,13 @@ class Kind:
     forms: tuple[tuple[str, ...], ...]
 
 
+BY_VELOCITY = "piston_velocity"
 FORCES = (("along",), ("friction",), ("along", "friction"))
 EITHER_OR_BOTH = (("lifting",), ("lowering",), ("lifting", "lowering"))
 KINDS = (
     Kind("unnamed_force", "piston_stroke", "m", force.STROKE, FORCES),
     # what turns round with the velocity is in a curve over it
-    Kind("unnamed_force", "piston_velocity", "m/s", force.VELOCITY, (("along",),)),
+    Kind("unnamed_force", BY_VELOCITY, "m/s", force.VELOCITY, (("along",),)),
     Kind("unnamed_opening", "piston_stroke", "m", opening.STROKE, (("change",),)),
     Kind("unnamed_opening", "valve_opening", "1", opening.OPENING, (("change",),)),
     Kind("unnamed_leakage", "own_pressure", "Pa", leakage.PRESSURE, EITHER_OR_BOTH),
@@ -98,7 +99,7 @@ def visited(over: str, evidence: Evidence) -> Array:
 
     Of the opening the command tells, which is a little more.
     """
-    if over == "piston_velocity":
+    if over == BY_VELOCITY:
         return evidence.velocity
     if over == "valve_opening":
         return np.concatenate([e.commands for e in evidence.experiments])

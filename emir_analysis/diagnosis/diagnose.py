@@ -75,11 +75,14 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if verdict == "nothing_missing":
         refitted = final = search.whole.fitted(final)
     with_curve, curves = None, Curves(search.balanced, evidence, search.floor)
-    if verdict == "found" and not (at_noise(final, evidence) or sticks(final)):
-        progress("asking whether a curve says it better")
-        with_curve = curves.measured_instead(final)
-        if with_curve is not None:
-            verdict = "unexplained"
+    if verdict == "found" and not at_noise(final, evidence):
+        if sticks(final):
+            progress("asking whether its friction differs with the direction")
+            verdict = "unexplained" if curves.uneven(final) else verdict
+        else:
+            progress("asking whether a curve says it better")
+            with_curve = curves.measured_instead(final)
+            verdict = "unexplained" if with_curve is not None else verdict
     rejected = None
     if verdict == "unexplained":
         rejected = final if final.effects else None

@@ -14,6 +14,7 @@ from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
 STAGES = ("nominal", "refitted", "with_effect")
+REFITTED = STAGES[1]
 BLACK_BOX = "black_box"
 
 

@@ -22,7 +22,7 @@ WEAK = 1e-9  # relative to what the strongest window's load changes: less is as 
 
 
 class Load(NamedTuple):
-    """M + F cos(2 pi f (t - begin) + phase): N, N, Hz, rad, s, s, s."""
+    """M + F exp(-d s) cos(2 pi f s + phase), s = t - begin: N, N, Hz, rad, s, s, s, 1/s."""
 
     force: float
     mean: float
@@ -31,6 +31,7 @@ class Load(NamedTuple):
     begin: float
     rise: float
     duration: float
+    decay: float = 0.0
 
 
 def constant(force: float, begin: float, duration: float) -> Load:

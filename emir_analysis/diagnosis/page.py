@@ -61,11 +61,11 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
 
 def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
     rows = [
-        (effect.name, effect.balance, name, p.value, p.low, p.high, p.unit)
+        (effect.name, effect.balance, name, *p.told, p.unit, p.meaning)
         for effect in effects
         for name, p in effect.parameters.items()
     ]
-    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit")
+    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit", "meaning")
     caption = "low, high: two standard deviations from the curvature of the fit"
     return [Table(columns, rows, caption)] if rows else []
 
@@ -97,7 +97,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
             "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
             "of the sensor noise (which is given in the signal's unit). Up to 1.1 is at the noise, "
             "up to 2 explained. The black box is a linear model of measured signals, trained on "
-            "the same recordings.",
+            f"the same recordings.{_nothing_added(result)}",
         ),
         Picture(
             free_runs_picture(findings, judged),
@@ -105,6 +105,12 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
             "Right: simulated minus measured, linear up to 5 times the noise.",
         ),
     ]
+
+
+def _nothing_added(result: Diagnosis) -> str:
+    if result.effects or result.curve is not None:
+        return ""
+    return " Nothing was added: the machine with effect is the re-fitted one."
 
 
 def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
@@ -212,14 +218,14 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
     stated = {u.path: u for u in findings.refitted.unknowns.members}
 
     def row(path: str, p: ParameterResult) -> tuple[str | float, ...]:
-        about = stated[path]
+        about, (value, low, high) = stated[path], p.told
         return (
             path,
             p.unit,
             about.origin,
             "{:.3g} ... {:.3g}".format(*about.deviation(0.0, 1.0)),
-            p.value,
-            f"{p.low:.3g} ... {p.high:.3g}",
+            value,
+            f"{low} ... {high}",
             ", ".join(other.rsplit(".", 1)[1] for other in p.confounded_with),
         )
 
@@ -230,7 +236,7 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
             [row(path, p) for path, p in result.parameters.items()],
             "interval: two standard deviations either way from the curvature of the fit, the "
             "tolerance counted as knowledge. What the recording cannot tell stays near its stated "
-            "value.",
+            "value, unless something that no effect explains pulls at it.",
         ),
     ]
 

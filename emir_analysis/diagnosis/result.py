@@ -1,8 +1,9 @@
 """The result of a diagnosis as values, and as JSON."""
 
 import json
+import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
+FEWEST_DIGITS = 3
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of errors look back
 
@@ -45,7 +47,8 @@ SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of err
 class ParameterResult:
     """A fitted parameter; low, high: two standard deviations from the curvature of the fit.
 
-    confounded_with: parameters whose fitted values go up or down with this one's.
+    confounded_with: parameters whose fitted values go up or down with this one's. meaning: of an
+    effect's parameter, as its registry says.
     """
 
     value: float
@@ -53,6 +56,17 @@ class ParameterResult:
     low: float
     high: float
     confounded_with: tuple[str, ...]
+    meaning: str = ""
+
+    @property
+    def told(self) -> tuple[str, str, str]:
+        """Return value, low and high with as many digits as tell them apart."""
+        largest, width = max(abs(self.low), abs(self.high)), self.high - self.low
+        digits = FEWEST_DIGITS
+        if math.isfinite(width) and width > 0.0:
+            digits += max(math.ceil(math.log10(largest / width)) - 1, 0)
+        value, low, high = (f"{x:.{digits}g}" for x in (self.value, self.low, self.high))
+        return value, low, high
 
 
 @dataclass(frozen=True)
@@ -239,10 +253,12 @@ def _effects(findings: Findings, fitted: dict[str, ParameterResult]) -> tuple[Ef
         for parameter, about in quantities(kind).items():
             path = f"effects.{name}.{parameter}"
             if path in fitted:
-                parameters[parameter] = fitted[path]
+                parameters[parameter] = replace(fitted[path], meaning=about.meaning)
             elif parameter not in kind.sizes:
                 value = float(getattr(effect, parameter))
-                parameters[parameter] = ParameterResult(value, about.unit, value, value, ())
+                parameters[parameter] = ParameterResult(
+                    value, about.unit, value, value, (), about.meaning
+                )
         found.append(EffectResult(name, kind.balance, parameters))
     return tuple(found)
 

@@ -33,6 +33,7 @@ SMALL = 0.1  # trial sizes, at which the free run is near enough to the known on
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 LOAD = "external_load"
+AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 
@@ -261,7 +262,7 @@ def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: _Left) ->
     members = loaded.unknowns.members[known.x.size :]
     size = SMALL * members[0].value(members[0].start)  # of the force
     begin = np.arange(0.0, float(evidence.experiments[0].time[-1]), LOAD_STEP)
-    steps = [_fields(members, constant(size, float(t), FOR_EVER)) for t in begin]
+    steps = [_fields(members, constant(size, float(t), FOR_EVER), AT_TIP) for t in begin]
     nothing = left([known])[0]
     changed = left([loaded.at(np.append(known.x, own)) for own in steps]) - nothing
     return likely(of_steps(begin, np.nan_to_num(changed / size), -np.nan_to_num(nothing)))
@@ -317,7 +318,7 @@ def _starts(
     """
     x = np.array([unknown.start for unknown in members])
     if effect == LOAD:
-        return [x, *(_fields(members, load) for load in loads)]
+        return [x, *(_fields(members, load, at) for load in loads for at in (AT_TIP, ON_PISTON))]
     sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
     negative = any(u.low < 0.0 for u, size in zip(members, sizes, strict=True) if size)
     allowed = [s for s in STARTS if s > 0.0 or negative]
@@ -329,9 +330,10 @@ def _starts(
     return starts
 
 
-def _fields(members: tuple[Unknown, ...], load: Load) -> Array:
-    """Return a load as the vector, (7,), of its effect's fields."""
-    return np.array([unknown.at(value) for unknown, value in zip(members, load, strict=True)])
+def _fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Array:
+    """Return a load as the vector, (9,), of its effect's fields."""
+    values = (*load, piston_share)
+    return np.array([unknown.at(value) for unknown, value in zip(members, values, strict=True)])
 
 
 def _soft(residual: Array) -> float:

@@ -19,7 +19,7 @@ FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balan
 BLOCK = 1.0  # s: errors closer than this are not counted as independent
 
 
-def score(mean_squares: Array, independent: float, unknowns: int) -> float:
+def score(mean_squares: Array, independent: float, unknowns: float) -> float:
     """Return a Bayesian information criterion; smaller is better.
 
     mean_squares: (c,) of each channel's error in units of its noise. independent: number of

@@ -9,18 +9,20 @@ from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.judged import STAGES, Judged
+from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.where import MOST, Where
 from emir_common.parameter_tree import declared
+from emir_plant.effects import REGISTRY
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
+PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 SHORT = 0.3  # of the recordings: a stretch of time that is named
 PARTS = {  # of a curve, as they are called
     "along": "whatever the direction",
@@ -114,7 +116,26 @@ def _judgement(findings: Findings, judged: Judged) -> str:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
-    return f"; but {judge}, {by}, shows more: diagnose from that too"
+    worse = ""
+    if findings.chosen.effects and off > judged.off(REFITTED):
+        worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"
+    more = f"shows more{_elsewhere(findings, judged)}"
+    return f"; but {judge}, {by}{worse}, {more}: diagnose from that too"
+
+
+def _elsewhere(findings: Findings, judged: Judged) -> str:
+    """Return at which strokes and pressures only the judge recordings were, if at many."""
+    known, shown = (
+        np.concatenate([e.outputs for e in evidence.experiments])
+        for evidence in (findings.evidence, judged.evidence)
+    )
+    found = []
+    for k, name in enumerate(list(OUTPUTS)[:PLACES]):
+        low, high = np.nanmin(known[:, k], initial=np.inf), np.nanmax(known[:, k], initial=-np.inf)
+        outside = float(np.mean((shown[:, k] < low) | (shown[:, k] > high)))
+        if outside >= BEYOND:
+            found.append(f"{name} for {100 * outside:.0f} % of it")
+    return f" (where nothing had been recorded: {', '.join(found)})" if found else ""
 
 
 def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
@@ -169,7 +190,15 @@ def at_end(findings: Findings) -> tuple[str, ...]:
 
 def _ends(chosen: Trial) -> tuple[str, ...]:
     together = zip(chosen.unknowns.members, chosen.x, strict=True)
-    return tuple(unknown.path for unknown, x in together if unknown.at_end(float(x)))
+    ends = [unknown.path for unknown, x in together if unknown.at_end(float(x))]
+    return tuple(path for path in ends if not _shapes(path))
+
+
+def _shapes(path: str) -> bool:
+    """Tell whether a parameter is an effect's and no size: it then ends in a limit case."""
+    group, _, field = path.partition(".")
+    effect, _, name = field.partition(".")
+    return group == "effects" and name not in REGISTRY[effect].sizes
 
 
 def closest(rejected: Trial) -> str:
@@ -178,7 +207,8 @@ def closest(rejected: Trial) -> str:
     ends = [path for path in _ends(rejected) if path.startswith("effects.")]
     said = [f"{path} = {values[path][1]:.3g} {values[path][0].unit}" for path in ends]
     led = f", {' and '.join(said)} at the end of what is looked for," if said else ""
-    return f"{' and '.join(rejected.effects)} comes closest{led} but leaves too much"
+    come = "come" if len(rejected.effects) > 1 else "comes"
+    return f"{' and '.join(rejected.effects)} {come} closest{led} but leaves too much"
 
 
 def tell_apart(findings: Findings) -> str | None:

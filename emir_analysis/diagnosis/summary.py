@@ -27,10 +27,14 @@ def summary(result: Diagnosis) -> str:
 
 def _sizes(effect: EffectResult) -> list[str]:
     """Return an effect's parameters with their intervals, a line for each."""
-    return [
-        f"{effect.name + '.' + name:48}{p.value:11.4g}  ({p.low:.4g} ... {p.high:.4g}) {p.unit}"
-        for name, p in effect.parameters.items()
-    ]
+    lines = []
+    for name, p in effect.parameters.items():
+        value, low, high = p.told
+        unit = "" if p.unit == "1" else f" {p.unit}"
+        lines.append(
+            f"{effect.name + '.' + name:40}{value:>11}{unit}  ({low} ... {high})  {p.meaning}"
+        )
+    return lines
 
 
 def cautions(result: Diagnosis) -> list[str]:
@@ -38,8 +42,8 @@ def cautions(result: Diagnosis) -> list[str]:
     lines = [result.tell_apart] if result.tell_apart else []
     if result.at_end:
         lines.append(
-            f"at the end of what is allowed: {', '.join(result.at_end)}; where that cannot be,"
-            " something else is missing"
+            f"at the end of what is allowed: {', '.join(result.at_end)}; a machine may be there,"
+            " but where this one cannot, something else is missing"
         )
     return lines + list(result.untold.values())
 

@@ -15,11 +15,17 @@ from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
-from emir_analysis.diagnosis.candidates import ACCURACY, GROWING, Trial, free_run_problem
-from emir_analysis.diagnosis.curves import CHAMBERS, KINDS, Kind, ends, told_forms
+from emir_analysis.diagnosis.candidates import (
+    ACCURACY,
+    GROWING,
+    Trial,
+    fit_balances,
+    free_run_problem,
+)
+from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
-from emir_analysis.diagnosis.select import EXPLAINED, STRONG, excess, free_run_score
+from emir_analysis.diagnosis.select import EXPLAINED, STRONG, excess, free_run_score, score
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -33,6 +39,7 @@ BENT = 0.1  # standard deviation of a curve's second differences, in units of it
 MOST = 10.0  # times its size: a curve goes no further
 BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve over its size
 SMOOTHING = "smoothing_speed"
+FRICTION = "_friction"  # how all of it is called
 
 
 class Curves:
@@ -69,6 +76,21 @@ class Curves:
             return None
         found = _fitted(best.trial, self._evidence)
         return found if excess(found, self._evidence) <= EXPLAINED**2 - 1.0 else None
+
+    def uneven(self, named: Trial) -> bool:
+        """Tell whether friction that differs with the direction says the balances clearly better.
+
+        named: with dry friction, and maybe effects beside it, of which a sensor's bias comes near
+        that: such friction is an even one and a constant force that acts in motion alone. Both as
+        the balances have them: the free run of what sticks is rough.
+        """
+        friction = named
+        for effect in named.effects:
+            if not effect.endswith(FRICTION):
+                friction = friction.without(effect)
+        fitted = [fit_balances(each, self._evidence, self._floor) for each in (named, friction)]
+        as_named, even = (self._about(each) for each in fitted)
+        return even.with_force_in_motion() < as_named.as_it_is() - STRONG
 
     def measured_instead(self, named: Trial) -> Trial | None:
         """Return the same where a curve says clearly what effects only come near.
@@ -154,6 +176,26 @@ class _Balances:
         self._slopes = np.nan_to_num(((missing[1:] - missing[0]) / steps[:, None]).T)
         self._independent = evidence.duration(1.0) / FORCE_WINDOW
 
+    def as_it_is(self) -> float:
+        """Return the criterion of the known trial."""
+        return self._score(self._missing, self._known.x.size)
+
+    def with_force_in_motion(self) -> float:
+        """Return the criterion with a force beside that is the same at any velocity but none."""
+        kind = next(k for k in KINDS if k.over == BY_VELOCITY)
+        first, last = ends(kind, self._evidence)
+        moving = np.abs(np.linspace(first, last, POINTS)) > 0.5 * (last - first) / (POINTS - 1)
+        values = {"over": kind.code, "first": first, "last": last}
+        size = self._size(kind)
+        values |= {f"along.{k}": size * on for k, on in enumerate(moving)}
+        machine = with_values(
+            self._known.machine, {f"{kind.group}.{name}": value for name, value in values.items()}
+        )
+        pushed = self._evidence.in_noise(self._evidence.residuals([machine]), self._floor)[0]
+        slopes = np.column_stack([self._slopes, np.nan_to_num(pushed - self._missing)])
+        left = self._missing - slopes @ np.linalg.lstsq(slopes, self._missing, rcond=None)[0]
+        return self._score(left, self._known.x.size + 1)
+
     def best(self, forms: Sequence[_Form]) -> _Begun | None:
         """Return the trial with the curves that the balances prefer, if there is any."""
         return min(map(self._smoothest, forms), key=lambda b: b.criterion, default=None)
@@ -230,12 +272,13 @@ class _Balances:
         The points count as the parameters that the balances tell in spite of what is expected of
         the second differences: the trace of the hat matrix.
         """
-        balances = left.reshape(-1, np.count_nonzero(self._evidence.fitted))
-        squares = np.maximum(np.mean(balances**2, axis=0), 1.0)
-        misfit = self._independent * float(np.sum(np.log(squares)))
         told = curves.T @ curves
-        count = float(np.trace(np.linalg.pinv(told + bending.T @ bending) @ told))
-        return misfit + count * math.log(self._independent * squares.size)
+        return self._score(left, np.trace(np.linalg.pinv(told + bending.T @ bending) @ told))
+
+    def _score(self, left: Array, count: float) -> float:
+        """Return the criterion of what is left, (n,), in units of the noise, by so many numbers."""
+        balances = left.reshape(-1, np.count_nonzero(self._evidence.fitted))
+        return score(np.maximum(np.mean(balances**2, axis=0), 1.0), self._independent, count)
 
 
 def _above_noise(left: Array) -> float:

@@ -1,5 +1,6 @@
 """Trials fitted to the free run of the whole recordings, each set of effects once."""
 
+import math
 from collections.abc import Callable
 
 from emir_analysis.diagnosis.candidates import HOPELESS, Trial, refine_free_run
@@ -11,6 +12,7 @@ from emir_analysis.diagnosis.friction_laws import (
     sticks,
     viscous_is_heard,
 )
+from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import STRONG, at_noise, excess, free_run_score
 from emir_analysis.diagnosis.stick_slip import grown
 from emir_analysis.signals import Array
@@ -37,9 +39,11 @@ class Whole:
             fitted = refine_free_run(chosen, self._evidence)
             if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
                 fitted = self._with_fewer_sizes(fitted)
-                again = self._led_again if sticks(fitted) else self._refined_again
-                fitted = again(fitted)
-            self._known[chosen.effects] = self._with_simple_shares(fitted)
+                if sticks(fitted):
+                    fitted = self._led_again(fitted)
+                else:
+                    fitted = self._with_other_shares(self._refined_again(fitted))
+            self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
     def _refined_again(self, fitted: Trial) -> Trial:
@@ -73,6 +77,18 @@ class Whole:
                 best = min(best, refine_free_run(alone, self._evidence), key=self.score)
         return best
 
+    def _with_other_shares(self, fitted: Trial) -> Trial:
+        """Return a trial fitted again from the other end of its shares, where that is better.
+
+        A share may have been led to the wrong end while another effect was missing.
+        """
+        for k, unknown in enumerate(fitted.unknowns.members):
+            if unknown.is_share and self._excess(fitted) > LEFT**2 - 1.0:
+                x = fitted.x.copy()
+                x[k] = unknown.low if x[k] > unknown.start else unknown.high
+                fitted = min(fitted, refine_free_run(fitted.at(x), self._evidence), key=self.score)
+        return fitted
+
     def _with_simple_shares(self, fitted: Trial) -> Trial:
         """Return a trial whose shares are none or all of it where that is as good.
 
@@ -85,6 +101,29 @@ class Whole:
                 score = self.score(fitted)
                 fitted = next((end for end in ends if self.score(end) <= score), fitted)
         return fitted
+
+    def _with_simple_load(self, fitted: Trial) -> Trial:
+        """Return a trial whose load from outside is steady or does not decay, if that is as good.
+
+        Over the time that it acts a slow swing is the same as a steady load.
+        """
+        if LOAD not in fitted.effects:
+            return fitted
+        start = f"effects.{LOAD}."
+        paths = [unknown.path for unknown in fitted.unknowns.members]
+        if start + "force" not in paths:
+            return fitted
+        load = fitted.machine.effects.external_load
+        steady, k = load.force * math.cos(load.phase) + load.mean, paths.index(start + "force")
+        x = fitted.x.copy()
+        x[k] = fitted.unknowns.members[k].at(steady)
+        still = fitted.at(x)
+        for name in ("mean", "frequency", "phase", "decay"):
+            still = still.fixed(start + name, 0.0)
+        lasting = fitted.fixed(start + "decay", 0.0)
+        ways = [refine_free_run(still, self._evidence), lasting]
+        score = self.score(fitted)
+        return next((way for way in ways if self.score(way) <= score), fitted)
 
     def keep(self, fitted: Trial) -> None:
         """Take a trial as the one that is fitted with its effects."""

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
-from emir_plant.effects.smooth_sign import smooth_sign
+from emir_plant.effects.smooth_sign import slope, smooth_sign
 from emir_plant.jit import compiled
 
 
@@ -45,10 +45,11 @@ def rate(offset: float, force: float, p: Any) -> float:
 
 
 @compiled
-def settling_rate(stiffness: float, p: Any) -> float:
-    """Return the rate, 1/s, at which play and oil settle where the force changes sign.
+def settling_rate(stiffness: float, force: float, p: Any) -> float:
+    """Return the rate, 1/s, at which play and oil settle under a force, N, of the oil.
 
     stiffness: of the oil against the piston's motion, N/m.
     """
-    yielding = 0.5 * p.backlash_gap / p.backlash_seating_force  # m/N, the most there is
+    steep = slope(force / p.backlash_seating_force, p.backlash_gradual_share)
+    yielding = 0.5 * p.backlash_gap / p.backlash_seating_force * steep  # m/N
     return (1.0 + yielding * stiffness) / p.backlash_crossing_time

@@ -1,4 +1,4 @@
-"""A force at the TCP that no state of the machine explains: wind, contact, a swinging load."""
+"""A force that no state of the machine explains: wind, contact, a swinging load."""
 
 import math
 from dataclasses import dataclass
@@ -11,11 +11,14 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class ExternalLoad(Effect):
-    """Force across the boom at the TCP, up positive: M + F cos(2 pi f (t - t_0) + phase).
+    """Force across the boom at the TCP, up positive: M + F exp(-d s) cos(2 pi f s + phase).
 
-    It sets in at t_0, all of it after a rise, and after its duration it falls as it rose; both
-    along straight lines. With t_0 long before the run the machine rests under it. f = 0 gives a
-    constant load or, with a short duration, a pulse; f > 0 a harmonic one about a mean M.
+    s = t - t_0, the time since it set in. All of it has come after a rise, and after its duration
+    it falls as it rose; both along straight lines. With t_0 long before the run the machine rests
+    under it. f = 0 gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one
+    about a mean M. For piston_share of it a force along the piston's rod instead, outward positive,
+    L / b times as large: at the longest lever arm b it has the moment of the one at the TCP, and
+    bends no arm.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -29,6 +32,8 @@ class ExternalLoad(Effect):
         "start": 1.0,
         "rise": 0.5,
         "duration": 1e3,
+        "decay": 0.05,
+        "piston_share": 0.5,
     }
 
     force: float = quantity("N", -1e5, 1e5, "F", default=0.0)
@@ -38,18 +43,33 @@ class ExternalLoad(Effect):
     start: float = quantity("s", -1e6, 1e6, "t_0, since the start of the run", default=0.0)
     rise: float = quantity("s", 0.0, 1e3, "from nothing to all of it, and back", default=0.0)
     duration: float = quantity("s", 1e-3, 1e6, "how long it acts", default=1e6)
+    decay: float = quantity("1/s", 0.0, 10.0, "d, of the swing", default=0.0)
+    piston_share: float = quantity("1", 0.0, 1.0, "of it, on the piston's rod", default=0.0)
 
 
 @compiled
 def force(time: float, p: Any) -> float:
-    """Return the force at the TCP, N, at a time since the start of the run, s."""
+    """Return the force, N, as at the TCP, at a time since the start of the run, s."""
     if p.external_load_force == 0.0 and p.external_load_mean == 0.0:
         return 0.0
     since = time - p.external_load_start
     share = _risen(since, p.external_load_rise)
     share -= _risen(since - p.external_load_duration, p.external_load_rise)
     angle = 2.0 * math.pi * p.external_load_frequency * since + p.external_load_phase
-    return share * (p.external_load_mean + p.external_load_force * math.cos(angle))
+    swing = p.external_load_force * math.exp(-p.external_load_decay * max(since, 0.0))
+    return share * (p.external_load_mean + swing * math.cos(angle))
+
+
+@compiled
+def at_tip(load: float, p: Any) -> float:
+    """Return what of a load, N, acts across the boom at the TCP, N."""
+    return (1.0 - p.external_load_piston_share) * load
+
+
+@compiled
+def on_piston(load: float, p: Any) -> float:
+    """Return what of a load, N, acts along the piston's rod, N."""
+    return p.external_load_piston_share * load * p.boom_length / p.triangle_b
 
 
 @compiled

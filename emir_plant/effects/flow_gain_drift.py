@@ -15,7 +15,8 @@ MINUTE = 60.0  # s
 class FlowGainDrift(Effect):
     """Opening times 1 + change [1 - exp(-t / T)] / [1 - exp(-1 min / T)], t since the start.
 
-    With a T beyond the run's length it is a straight line. The gain does not fall below 0.
+    With a T beyond the run's length it is a straight line. The gain does not fall below 0. Of both
+    metering edges or, for inlet_share of it, of that from the pump alone.
     """
 
     balance: ClassVar[Balance] = "valve"
@@ -23,15 +24,16 @@ class FlowGainDrift(Effect):
     source: ClassVar[str] = (
         "viscosity falls as the tank warms up; 5-20 % of the flow over some minutes"
     )
-    trial: ClassVar[dict[str, float]] = {"change": 0.05}
+    trial: ClassVar[dict[str, float]] = {"change": 0.05, "inlet_share": 0.5}
 
     change: float = quantity("1", -0.9, 5.0, "relative, of the gain, in a minute", default=0.0)
     time_constant: float = quantity("s", 1.0, 1e5, "T, of warming up", default=300.0)
+    inlet_share: float = quantity("1", 0.0, 1.0, "of it, at the inlet's edge alone", default=0.0)
 
 
 @compiled
 def gain(time: float, p: Any) -> float:
-    """Return the factor on the opening at a time since the start of the run, s."""
+    """Return the factor on the opening at a time since the start of the run, s, at the inlet."""
     if p.flow_gain_drift_change == 0.0:
         return 1.0
     warming = p.flow_gain_drift_time_constant

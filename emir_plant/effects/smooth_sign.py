@@ -18,6 +18,15 @@ def smooth_sign(number: float, gradual: float) -> float:
 
 
 @compiled
+def slope(number: float, gradual: float) -> float:
+    """Return the slope of `smooth_sign` over its number."""
+    steep = 1.0 - _tanh(number) ** 2
+    if gradual == 0.0:
+        return steep
+    return (1.0 - gradual) * steep + gradual / (number * number + 1.0) ** 1.5
+
+
+@compiled
 def _tanh(number: float) -> float:
     """Return tanh(number), to 2e-16: by one exponential, in a third of the C library's time."""
     return 1.0 - 2.0 / (math.exp(2.0 * number) + 1.0)

@@ -19,6 +19,7 @@ from emir_plant.effects import (
     vessel_compliance,
     viscous_friction,
 )
+from emir_plant.hydraulics.flows import Edges
 from emir_plant.jit import compiled
 from emir_plant.unnamed import compliance as unnamed_compliance
 from emir_plant.unnamed import force as unnamed_force
@@ -114,10 +115,19 @@ def stiffness_lowering(pressure: float, volume: float, p: Any) -> float:
 
 
 @compiled
-def opening(stated: float, time: float, stroke: float, p: Any) -> float:
-    """Return the opening of the metering edges at a time, s, from the one as stated.
+def edges(stated: float, time: float, stroke: float, p: Any) -> Edges:
+    """Return the openings of the metering edges at a time, s, from the one as stated.
 
     stroke: of the piston, m.
     """
-    scaled = valve_gain_asymmetry.scaled(stated, p) * flow_gain_drift.gain(time, p)
-    return scaled * unnamed_opening.factor(stated, stroke, p)
+    asymmetry, drift = valve_gain_asymmetry.gain(stated, p), flow_gain_drift.gain(time, p)
+    opening = stated * unnamed_opening.factor(stated, stroke, p)
+    outlet = opening * _at_outlet(asymmetry, p.valve_gain_asymmetry_inlet_share)
+    outlet *= _at_outlet(drift, p.flow_gain_drift_inlet_share)
+    return Edges(opening * asymmetry * drift, outlet)
+
+
+@compiled
+def _at_outlet(gain: float, inlet_share: float) -> float:
+    """Return an opening's gain at the edge to the tank, of which a share is the inlet's alone."""
+    return gain - inlet_share * (gain - 1.0)

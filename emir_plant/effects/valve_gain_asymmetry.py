@@ -10,20 +10,24 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class ValveGainAsymmetry(Effect):
-    """Opening times 1 + error, with an error of its own for each direction."""
+    """Opening times 1 + error, with an error of its own for each direction.
+
+    Of both metering edges or, for inlet_share of it, of that from the pump alone.
+    """
 
     balance: ClassVar[Balance] = "valve"
     sizes: ClassVar[tuple[str, ...]] = ("lifting", "lowering")
     source: ClassVar[str] = "manufacturing tolerance of the metering edges, 5-10 %"
-    trial: ClassVar[dict[str, float]] = {"lifting": 0.05, "lowering": 0.05}
+    trial: ClassVar[dict[str, float]] = {"lifting": 0.05, "lowering": 0.05, "inlet_share": 0.5}
 
     lifting: float = quantity("1", -0.9, 2.0, "relative error of the opening, o > 0", default=0.0)
     lowering: float = quantity("1", -0.9, 2.0, "relative error of the opening, o < 0", default=0.0)
+    inlet_share: float = quantity("1", 0.0, 1.0, "of it, at the inlet's edge alone", default=0.0)
 
 
 @compiled
-def scaled(opening: float, p: Any) -> float:
-    """Return the opening as it is, from the opening as stated."""
+def gain(opening: float, p: Any) -> float:
+    """Return the factor on an opening as stated, at the inlet."""
     if opening > 0.0:
-        return opening * (1.0 + p.valve_gain_asymmetry_lifting)
-    return opening * (1.0 + p.valve_gain_asymmetry_lowering)
+        return 1.0 + p.valve_gain_asymmetry_lifting
+    return 1.0 + p.valve_gain_asymmetry_lowering

@@ -10,6 +10,16 @@ from emir_plant.hydraulics.orifice import turbulent_flow
 from emir_plant.jit import compiled, square_root
 
 
+class Edges(NamedTuple):
+    """The openings of the metering edges from the pump and to the tank.
+
+    Of one sign, negative while lowering; 0 inside the dead zone, 1 fully open.
+    """
+
+    inlet: float
+    outlet: float
+
+
 class Pressures(NamedTuple):
     """The pressures between which oil flows, Pa; the tank's is a parameter."""
 
@@ -43,50 +53,50 @@ def pump_flow(
 
 
 @compiled
-def lifting_flows(opening: float, pressures: Pressures, p: Any) -> tuple[float, float]:
-    """Return (Q_H, Q_S), m^3/s, for an opening > 0."""
-    inflow = pump_flow(opening, p.flow_nominal, pressures.supply, pressures.lifting, p)
-    conductance = opening / square_root(p.k_meter_out_lifting + p.k_return_line * opening * opening)
+def lifting_flows(edges: Edges, pressures: Pressures, p: Any) -> tuple[float, float]:
+    """Return (Q_H, Q_S), m^3/s, for openings > 0."""
+    inflow = pump_flow(edges.inlet, p.flow_nominal, pressures.supply, pressures.lifting, p)
+    out = edges.outlet
+    conductance = out / square_root(p.k_meter_out_lifting + p.k_return_line * out * out)
     return inflow, -turbulent_flow(pressures.lowering - p.pT, conductance)
 
 
 @compiled
-def lowering_flows(
-    opening: float, pressures: Pressures, logic: float, p: Any
-) -> tuple[float, float]:
-    """Return (Q_H, Q_S), m^3/s, for an opening < 0; logic is the block's opening y4 in [0, 1].
+def lowering_flows(edges: Edges, pressures: Pressures, logic: float, p: Any) -> tuple[float, float]:
+    """Return (Q_H, Q_S), m^3/s, for openings < 0; logic is the block's opening y4 in [0, 1].
 
     The pressure balance stands in the inlet, or in the return, where it holds the flow out to
     opening * Q_n as long as the load's pressure suffices; the inlet then is a plain edge.
     """
     nominal = p.flow_nominal * p.flow_ratio_lowering
     supply = min(pressures.supply, p.limit_lowering)
-    edge, block = opening * opening, logic * logic
+    out = abs(edges.outlet)
+    edge, block = out * out, logic * logic
     resistance = p.k_meter_out_lowering * block + p.k_return_line * edge * block
     resistance += p.k_block_out * edge
-    conductance = abs(opening) * logic / square_root(resistance)
+    conductance = out * logic / square_root(resistance)
     outflow = turbulent_flow(pressures.lifting - p.pT, conductance)
     if p.balance_lowering == 0.0:
-        return -outflow, pump_flow(opening, nominal, supply, pressures.lowering, p)
-    inflow = inlet_flow(abs(opening) * nominal, supply - pressures.lowering, p)
-    return -min(outflow, abs(opening) * p.flow_nominal), max(0.0, inflow)
+        return -outflow, pump_flow(edges.inlet, nominal, supply, pressures.lowering, p)
+    inflow = inlet_flow(abs(edges.inlet) * nominal, supply - pressures.lowering, p)
+    return -min(outflow, out * p.flow_nominal), max(0.0, inflow)
 
 
 @compiled
-def flows(opening: float, pressures: Pressures, logic: float, p: Any) -> tuple[float, float]:
-    """Return (Q_H, Q_S), m^3/s; both chambers are shut while the opening is 0."""
-    if opening > 0.0:
-        return lifting_flows(opening, pressures, p)
-    if opening < 0.0:
-        return lowering_flows(opening, pressures, logic, p)
+def flows(edges: Edges, pressures: Pressures, logic: float, p: Any) -> tuple[float, float]:
+    """Return (Q_H, Q_S), m^3/s; both chambers are shut while the openings are 0."""
+    if edges.inlet > 0.0:
+        return lifting_flows(edges, pressures, p)
+    if edges.inlet < 0.0:
+        return lowering_flows(edges, pressures, logic, p)
     return 0.0, 0.0
 
 
 @compiled
-def delivered(opening: float, flow_lifting: float, flow_lowering: float) -> float:
+def delivered(edges: Edges, flow_lifting: float, flow_lowering: float) -> float:
     """Return the pump's part of the flows (Q_H, Q_S), m^3/s."""
-    if opening > 0.0:
+    if edges.inlet > 0.0:
         return flow_lifting
-    if opening < 0.0:
+    if edges.inlet < 0.0:
         return flow_lowering
     return 0.0

@@ -139,9 +139,9 @@ def _valve_sized(main: Machine, flow: float, values: dict[str, float], effects: 
 @compiled
 def _valve_flows(x: Array, supply: float, p: Any) -> tuple[float, float, float]:
     """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
-    opening = terms.opening(valve.opening(x[SPOOL], p), 0.0, 0.0, p)
-    lifting, lowering = flows(opening, Pressures(supply, x[P_H], x[P_S]), x[LOGIC], p)
-    return lifting, lowering, delivered(opening, lifting, lowering)
+    edges = terms.edges(valve.opening(x[SPOOL], p), 0.0, 0.0, p)
+    lifting, lowering = flows(edges, Pressures(supply, x[P_H], x[P_S]), x[LOGIC], p)
+    return lifting, lowering, delivered(edges, lifting, lowering)
 
 
 @compiled

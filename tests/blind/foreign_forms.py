@@ -45,6 +45,72 @@ class LinearDrift(Hidden):
         return super().opening(edges, time, stroke) * gain
 
 
+class _AtInlet(Hidden):
+    """An error of the gain at the edge from the pump alone."""
+
+    def gain(self, opening: float, time: float) -> float:
+        """Return the factor on what the inlet lets through."""
+        raise NotImplementedError
+
+    def opening(self, edges: float, time: float, stroke: float) -> float:
+        found = super().opening(edges, time, stroke)
+        self._inlet = self.gain(found, time)
+        return found
+
+    def pumped(self, wanted: float, drop: float) -> float:
+        return super().pumped(wanted * self._inlet, drop)
+
+
+class DriftAtInlet(_AtInlet):
+    """A pump, or a pressure balance, whose flow changes evenly with time."""
+
+    name = "flow_gain_drift~at the inlet"
+    grows = ("inlet_per_minute",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"inlet_per_minute": either_sign(random, 0.06, 0.25)}
+
+    def gain(self, opening: float, time: float) -> float:
+        return 1.0 + self.sizes["inlet_per_minute"] * time / 60.0
+
+
+class AsymmetryAtInlet(_AtInlet):
+    """Another flow from the pump in one direction."""
+
+    name = "valve_gain_asymmetry~at the inlet"
+    grows = ("inlet_lifting", "inlet_lowering")
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {str(random.choice(cls.grows)): either_sign(random, 0.04, 0.15)}
+
+    def gain(self, opening: float, time: float) -> float:
+        return 1.0 + self.size("inlet_lifting" if opening > 0.0 else "inlet_lowering")
+
+
+class LoadOnPiston(Hidden):
+    """A force along the piston's rod: what leans on the cylinder, comes within a while and goes."""
+
+    name = "external_load~on the piston"
+    grows = ("leans",)
+    COMES = 0.3  # s
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "leans": either_sign(random, 1.5e4, 6e4),
+            "leans_at": random.uniform(5.0, 25.0),
+            "leans_for": float(random.choice([1e6, random.uniform(5.0, 15.0)])),
+        }
+
+    def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        since = time - self.sizes["leans_at"]
+        left = self.sizes["leans_for"] - since
+        force = self.sizes["leans"] * min(max(min(since, left) / self.COMES, 0.0), 1.0)
+        return super().accelerations(x, time, angle, push + force)
+
+
 class SlowLoad(Hidden):
     """A load that comes slowly and stays, or goes as it came."""
 
@@ -156,6 +222,9 @@ class PlayOfMagnet(Hidden):
 FOREIGN: tuple[type[Hidden], ...] = (
     LateSensor,
     LinearDrift,
+    DriftAtInlet,
+    AsymmetryAtInlet,
+    LoadOnPiston,
     SlowLoad,
     SwingAboutMean,
     OtherOil,

@@ -167,6 +167,24 @@ FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"pressure_lifting": 0.037, "dead_share": 1.0},
     ),
     _OTHER["flow_gain_drift~linear"]: ({"per_minute": 0.6}, {"change": 0.6, "time_constant": 1e5}),
+    _OTHER["flow_gain_drift~at the inlet"]: (
+        {"inlet_per_minute": 0.6},
+        {"change": 0.6, "time_constant": 1e5, "inlet_share": 1.0},
+    ),
+    _OTHER["valve_gain_asymmetry~at the inlet"]: (
+        {"inlet_lifting": 0.2},
+        {"lifting": 0.2, "inlet_share": 1.0},
+    ),
+    _OTHER["external_load~on the piston"]: (
+        {"leans": 4e4, "leans_at": 0.7, "leans_for": 2.0},
+        {
+            "force": 4e4 * STATED.triangle_b / STATED.boom_length,
+            "start": 0.7,
+            "rise": 0.3,
+            "duration": 1.7,
+            "piston_share": 1.0,
+        },
+    ),
     _OTHER["external_load~slow"]: (
         {"pull": 1e3, "comes_at": 0.7, "comes_in": 0.8, "stays": 2.0},
         {"force": 1e3, "start": 0.7, "rise": 0.8, "duration": 2.0},

@@ -292,6 +292,21 @@ def test_a_constant_load_is_carried_by_the_piston_and_bends_the_boom() -> None:
     assert after.tcp_deflection - before.tcp_deflection == pytest.approx(cantilever, rel=0.05)
 
 
+@pytest.mark.parametrize("degrees", [30.0, 60.0])
+def test_a_load_on_the_piston_is_carried_by_the_oil_and_bends_no_arm(degrees: float) -> None:
+    """Statics by hand: the oil pushes by F L / b less, at any angle."""
+    angle = math.radians(degrees)
+    loaded = _with(external_load={"mean": 1e3, "piston_share": 1.0})
+    rest = loaded.initial(angle, 20e5)
+    rate = np.delete(loaded.derivative(rest, 0.0), core.TIME)
+    assert np.abs(rate).max() < 1e-5
+    before, after = PLAIN.outputs(PLAIN.initial(angle, 20e5)), loaded.outputs(rest)
+    g = MACHINE.geometry
+    pushed = 1e3 * g.boom_length / g.triangle_b
+    assert before.force - after.force == pytest.approx(pushed)
+    assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
+
+
 def test_a_load_acts_from_its_start_for_its_duration() -> None:
     pulse = _with(external_load={"force": 1e3, "start": 2.0, "duration": 0.5}).record[0]
     assert [external_load.force(t, pulse) for t in (1.99, 2.0, 2.49, 2.5)] == [0.0, 1e3, 1e3, 0.0]
@@ -309,6 +324,14 @@ def test_a_load_rises_and_falls_along_straight_lines_about_a_mean() -> None:
 
 
 # kinematics
+
+
+def test_a_swing_decays_from_where_it_set_in() -> None:
+    """Half of it is left after ln 2 / d; what came before it set in is nothing."""
+    swing = {"force": 1e3, "mean": 200.0, "frequency": 1.0, "start": 50.0, "decay": math.log(2.0)}
+    p = _with(external_load=swing).record[0]
+    values = [external_load.force(t, p) for t in (0.0, 50.0, 51.0, 53.5)]
+    assert values == pytest.approx([0.0, 1200.0, 700.0, 200.0 - 1e3 / 2**3.5], abs=1e-9)
 
 
 def test_linkage_error_is_the_stated_one_and_keeps_the_power() -> None:
@@ -501,6 +524,22 @@ def test_gain_asymmetry_scales_the_flow_of_one_direction() -> None:
     assert flows[3] == pytest.approx(1.1 * flows[1])
 
 
+def test_a_gain_may_change_at_the_inlet_alone() -> None:
+    """By a tenth and a fifth: the pump's flow is the product, what returns is as it was."""
+    asymmetry = {"lifting": 0.1, "lowering": 0.1, "inlet_share": 1.0}
+    drift = {"change": 0.2, "time_constant": 60.0, "inlet_share": 1.0}
+    plant = _with(valve_gain_asymmetry=asymmetry, flow_gain_drift=drift)
+    for command in (0.5, -0.5):
+        state = PLAIN.initial(FORTY_FIVE, 20e5)
+        state[core.SPOOL], state[core.TIME] = command, 60.0
+        before, after = PLAIN.outputs(state), plant.outputs(state)
+        from_pump, back = "flow_lifting", "flow_lowering"
+        if command < 0.0:
+            from_pump, back = back, from_pump
+        assert getattr(after, from_pump) == pytest.approx(1.1 * 1.2 * getattr(before, from_pump))
+        assert getattr(after, back) == getattr(before, back)
+
+
 def test_hysteresis_is_a_play_behind_an_overshooting_spool() -> None:
     """Against the spool's exact answer in steps of 0.01 ms, the edges pushed at half the width."""
     width, damping, held, fine = 0.04, 0.3, 300, 100
@@ -623,7 +662,7 @@ def test_gain_has_drifted_by_its_change_after_a_minute_and_ends() -> None:
     assert flow_gain_drift.gain(60.0, p) == pytest.approx(1.2)
     end = 0.2 / (1.0 - math.exp(-1.0))
     assert flow_gain_drift.gain(1e6, p) == pytest.approx(1.0 + end)
-    assert terms.opening(-0.5, 1e6, 0.5, p) == pytest.approx(-0.5 * (1.0 + end))
+    assert terms.edges(-0.5, 1e6, 0.5, p) == pytest.approx([-0.5 * (1.0 + end)] * 2)
 
 
 def test_gain_that_drifts_long_goes_straight_and_never_below_nothing() -> None:

@@ -10,7 +10,7 @@ from emir_common.parameter_tree import with_values
 from emir_plant import core, linkage
 from emir_plant.core import Truth
 from emir_plant.hydraulics import logic_block, valve
-from emir_plant.hydraulics.flows import Pressures, flows, pump_flow
+from emir_plant.hydraulics.flows import Edges, Pressures, flows, pump_flow
 from emir_plant.hydraulics.orifice import turbulent_flow
 from emir_plant.plant import Plant
 from emir_plant.sheet import even_edges, joint1
@@ -18,6 +18,11 @@ from emir_plant.sheet import even_edges, joint1
 PLANT = Plant(joint1())
 P = PLANT.record[0]
 BAR = 1e5
+
+
+def _edges(opening: float) -> Edges:
+    """Both metering edges open alike."""
+    return Edges(opening, opening)
 
 
 def test_orifice_is_turbulent_far_from_zero_and_smooth_at_zero() -> None:
@@ -31,7 +36,7 @@ def test_orifice_is_turbulent_far_from_zero_and_smooth_at_zero() -> None:
 def test_both_chambers_are_shut_in_the_dead_zone() -> None:
     for spool in np.linspace(-0.1, 0.1, 21):
         assert valve.opening(spool, P) == 0.0
-    assert flows(0.0, Pressures(P["p0"], 100 * BAR, 20 * BAR), 1.0, P) == (0.0, 0.0)
+    assert flows(_edges(0.0), Pressures(P["p0"], 100 * BAR, 20 * BAR), 1.0, P) == (0.0, 0.0)
     assert valve.opening(1.0, P) == 1.0
     assert valve.opening(-0.55, P) == pytest.approx(-0.5)
 
@@ -59,7 +64,7 @@ def test_pump_delivers_nothing_against_a_higher_pressure() -> None:
 def test_return_flow_meets_the_series_of_resistances() -> None:
     """Lowering: the pressure drops over edge, line and block add up to p_H - p_T."""
     opening, logic = -0.4, 0.7
-    flow = -flows(opening, Pressures(P["p0"], 120 * BAR, 50 * BAR), logic, P)[0]
+    flow = -flows(_edges(opening), Pressures(P["p0"], 120 * BAR, 50 * BAR), logic, P)[0]
     resistance = P["k_meter_out_lowering"] / opening**2 + P["k_return_line"]
     resistance += P["k_block_out"] / logic**2
     assert resistance * flow**2 == pytest.approx(120 * BAR - P["pT"], rel=1e-3)
@@ -68,10 +73,10 @@ def test_return_flow_meets_the_series_of_resistances() -> None:
 def test_pressure_balance_in_the_return_lowers_any_load_alike() -> None:
     p = Plant(even_edges()).record[0]
     for opening in (-0.2, -0.6, -1.0):
-        out = [flows(opening, Pressures(p["p0"], load, BAR), 1.0, p)[0]
+        out = [flows(_edges(opening), Pressures(p["p0"], load, BAR), 1.0, p)[0]
                for load in np.array([20, 80, 300]) * BAR]  # fmt: skip
         assert out == pytest.approx([opening * p["flow_nominal"]] * 3)
-    short = flows(-1.0, Pressures(p["p0"], 5 * BAR, BAR), 1.0, p)[0]
+    short = flows(_edges(-1.0), Pressures(p["p0"], 5 * BAR, BAR), 1.0, p)[0]
     resistance = p["k_meter_out_lowering"] + p["k_return_line"] + p["k_block_out"]
     assert resistance * short**2 == pytest.approx(5 * BAR - p["pT"], rel=0.1)  # laminar below 1 bar
     assert short > -p["flow_nominal"]
@@ -79,7 +84,7 @@ def test_pressure_balance_in_the_return_lowers_any_load_alike() -> None:
 
 def test_lowering_chamber_is_fed_up_to_its_limit_and_never_drained_to_the_pump() -> None:
     p = Plant(even_edges()).record[0]
-    inflow = [flows(-0.5, Pressures(p["p0"], 100 * BAR, at), 1.0, p)[1]
+    inflow = [flows(_edges(-0.5), Pressures(p["p0"], 100 * BAR, at), 1.0, p)[1]
               for at in (0.0, p["limit_lowering"], 50 * BAR)]  # fmt: skip
     resistance = p["k_pump_line"] + p["k_block_in"]
     resistance += p["balance_pressure"] / (0.5 * p["flow_nominal"]) ** 2
@@ -88,7 +93,7 @@ def test_lowering_chamber_is_fed_up_to_its_limit_and_never_drained_to_the_pump()
 
 
 def test_closed_logic_block_lets_nothing_out() -> None:
-    out, inflow = flows(-0.5, Pressures(P["p0"], 120 * BAR, 50 * BAR), 0.0, P)
+    out, inflow = flows(_edges(-0.5), Pressures(P["p0"], 120 * BAR, 50 * BAR), 0.0, P)
     assert out == 0.0
     assert inflow > 0.0
 

@@ -63,9 +63,7 @@ def write_page(
             [
                 (
                     path,
-                    p.value,
-                    p.low,
-                    p.high,
+                    *p.told,
                     p.unit.replace("time", result.time_unit),
                     ", ".join(p.confounded_with),
                 )
@@ -79,7 +77,7 @@ def write_page(
 
 def _effects(result: ActuatorDiagnosis) -> list[Block]:
     rows = [
-        (e.name, e.balance, name, p.value, p.low, p.high, p.unit.replace("time", result.time_unit))
+        (e.name, e.balance, name, *p.told, p.unit.replace("time", result.time_unit), p.meaning)
         for e in result.effects
         for name, p in e.parameters.items()
     ]
@@ -87,7 +85,7 @@ def _effects(result: ActuatorDiagnosis) -> list[Block]:
         "low, high: two standard deviations from the curvature of the fit. Flows are in units of"
         " the pressure rate that they make, velocities in units of flow."
     )
-    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit")
+    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit", "meaning")
     return [Table(columns, rows, about)] if rows else []
 
 

@@ -1,7 +1,7 @@
 """The result of an actuator's diagnosis, in the form and with the keys of the boom's."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from emir_analysis.diagnosis.result import (
 from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 from emir_analysis.signals import Array
+from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
@@ -193,8 +194,10 @@ def summary(result: ActuatorDiagnosis) -> str:
     lines = [f"{result.verdict}: {result.statement}", f"({result.not_told})", ""]
     for effect in result.effects:
         for name, p in effect.parameters.items():
-            about = f"{p.value:10.4g}  ({p.low:.3g} ... {p.high:.3g}) {_unit(p.unit, result)}"
-            lines.append(f"{effect.name + '.' + name:36}{about}")
+            value, low, high = p.told
+            unit = "" if p.unit == "1" else f" {_unit(p.unit, result)}"
+            about = f"{value:>11}{unit}  ({low} ... {high})  {p.meaning}"
+            lines.append(f"{effect.name + '.' + name:40}{about}")
     i, ahead = result.tests[PRESSURE].intervals, result.one_step[PRESSURE]
     figures = "  " + ", ".join(f"{label} {getattr(s, n):.3f}" for n, label in LABELS.items())
     lines += [
@@ -249,6 +252,8 @@ def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:
 def _effect(name: str, fitted: dict[str, ParameterResult]) -> EffectResult:
     start = f"effects.{name}."
     own = {path.removeprefix(start): p for path, p in fitted.items() if path.startswith(start)}
+    about = quantities(REGISTRY[name])
+    own = {parameter: replace(p, meaning=about[parameter].meaning) for parameter, p in own.items()}
     return EffectResult(name, REGISTRY[name].balance, own)
 
 

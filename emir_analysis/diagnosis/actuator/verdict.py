@@ -36,7 +36,8 @@ def statement(word: str, found: Search, noise: float, curve: CurveResult | None)
         f" {chosen:.3g} on parts left out of the fit, {plain:.3g} with parameters only"
     )
     if word == "unexplained":
-        closest = f"{found.chosen.name} comes closest; " if found.chosen.effects else ""
+        come = "come" if len(found.chosen.effects) > 1 else "comes"
+        closest = f"{found.chosen.name} {come} closest; " if found.chosen.effects else ""
         told = _told(curve) if curve else ""
         return (
             f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says"

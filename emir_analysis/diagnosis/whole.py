@@ -78,15 +78,17 @@ class Whole:
         return best
 
     def _with_other_shares(self, fitted: Trial) -> Trial:
-        """Return a trial fitted again from the other end of its shares, where that is better.
+        """Return a trial fitted again from none and all of its shares, where that is better.
 
-        A share may have been led to the wrong end while another effect was missing.
+        A share may have been led to the wrong place while another effect was missing.
         """
         for k, unknown in enumerate(fitted.unknowns.members):
-            if unknown.is_share and self._excess(fitted) > LEFT**2 - 1.0:
-                x = fitted.x.copy()
-                x[k] = unknown.low if x[k] > unknown.start else unknown.high
-                fitted = min(fitted, refine_free_run(fitted.at(x), self._evidence), key=self.score)
+            for end in (unknown.low, unknown.high) if unknown.is_share else ():
+                if self._excess(fitted) > LEFT**2 - 1.0 and fitted.x[k] != end:
+                    x = fitted.x.copy()
+                    x[k] = end
+                    again = refine_free_run(fitted.at(x), self._evidence)
+                    fitted = min(fitted, again, key=self.score)
         return fitted
 
     def _with_simple_shares(self, fitted: Trial) -> Trial:

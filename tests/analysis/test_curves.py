@@ -126,6 +126,34 @@ def test_no_curve_takes_the_place_of_an_effect_that_is_there() -> None:
     assert instead(with_values(joint1(), gap), "external_leakage") is None
 
 
+BETWEEN = np.linspace(-0.3, 0.3, POINTS)  # m/s
+
+
+@pytest.mark.parametrize(
+    ("beside", "uneven"),
+    [
+        # 14 kN lifting, 5 kN lowering: an even friction and 4.5 kN against lifting while it moves
+        ({"unnamed_force.over": 2, "unnamed_force.first": BETWEEN[0],
+          "unnamed_force.last": BETWEEN[-1],
+          "unnamed_force.along": (-4.5e3 * (np.abs(BETWEEN) > 1e-3)).tolist()}, True),
+        ({"effects.sensor_bias.pressure_lifting": 1e5}, False),
+        ({"effects.internal_leakage.coefficient": 1e-12}, False),
+    ],
+)  # fmt: skip
+def test_friction_that_differs_with_the_direction_is_told_from_a_bias(
+    beside: dict[str, object], *, uneven: bool
+) -> None:
+    friction = {"effects.coulomb_friction.force": 9.5e3}
+    evidence = Evidence([recording(with_values(joint1(), friction | beside))], joint1())
+    sheet = Sheet(joint1(), {"cylinder.beta": 0.1}, {}, ())
+    floor = evidence.floor(sheet.machine)
+    curves = Curves(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
+    second = (
+        "internal_leakage" if "effects.internal_leakage.coefficient" in beside else "sensor_bias"
+    )
+    assert curves.uneven(trial(sheet, ("coulomb_friction", second))) == uneven
+
+
 def curve_of(found: Trial | None) -> Curve:
     """Return the curve that was measured."""
     assert found is not None

@@ -18,6 +18,7 @@ from emir_analysis.diagnosis.candidates import (
     at_rest,
     fit_balances,
     fit_free_run,
+    refine_free_run,
     trial,
 )
 from emir_analysis.diagnosis.diagnose import loudest
@@ -222,7 +223,8 @@ def test_a_black_box_may_be_trained_where_a_signal_stays_as_it_is(angle: float) 
 def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:
     """No window of the last third knows of a load that acted from 2 to 6 s of 16 s."""
     sizes = {"force": 1500.0, "start": 2.0, "duration": 4.0}
-    sizes |= dict.fromkeys(("mean", "frequency", "phase", "rise"), 0.0)
+    others = ("mean", "frequency", "phase", "rise", "decay", "piston_share")
+    sizes |= dict.fromkeys(others, 0.0)
     pulse = {f"effects.external_load.{name}": value for name, value in sizes.items()}
     searched, sheet, evidence = search(pulse)
     plain = fit_balances(trial(sheet, ()), evidence, searched.floor)
@@ -341,6 +343,58 @@ def test_a_share_is_none_or_all_where_the_recording_does_not_tell(
     assert found.machine.effects.sensor_delay.dead_share == pytest.approx(share, abs=0.1)
     members = [unknown.path for unknown in found.unknowns.members]
     assert ("effects.sensor_delay.dead_share" in members) == told
+
+
+def test_a_share_finds_back_from_the_wrong_end() -> None:
+    """Play of the magnet beside air, fitted as if it were behind the spool before the air."""
+    play = {"width": 0.03, "command_share": 1.0}
+    values = {f"effects.valve_hysteresis.{name}": value for name, value in play.items()}
+    values |= {"effects.entrained_air.share": 0.01, "effects.entrained_air.exponent": 1.2}
+    levels = np.random.default_rng(1).choice([-0.35, -0.2, 0.0, 0.0, 0.2, 0.35], 60)
+    jumps = operated(with_values(joint1(), values), np.append(np.zeros(40), np.repeat(levels, 8)))
+    searched, sheet, evidence = search({}, lambda _: jumps)
+    share = "effects.valve_hysteresis.command_share"
+    known = refine_free_run(trial(sheet, ("valve_hysteresis",)).fixed(share, 0.0), evidence)
+    both = trial(sheet, ("valve_hysteresis", "entrained_air"))
+    values = known.unknowns.values(known.x) | {share: 0.0}
+    begun = [values.get(u.path, u.value(u.start)) for u in both.unknowns.members]
+    begun = [u.at(v) for u, v in zip(both.unknowns.members, begun, strict=True)]
+    found = searched.whole.fitted(both.at(np.array(begun)))
+    assert found.machine.effects.valve_hysteresis.command_share == pytest.approx(1.0, abs=0.01)
+    assert found.machine.effects.entrained_air.share == pytest.approx(0.01, rel=0.02)
+
+
+def test_a_load_that_hardly_swings_while_it_acts_is_steady() -> None:
+    """On the piston from 4 to 8 s, fitted from a slow swing with a decay."""
+    hidden = {"force": -1200.0, "start": 4.0, "duration": 4.0, "rise": 0.2, "piston_share": 1.0}
+    slow = hidden | {"mean": 0.0, "frequency": 1e-3, "phase": -0.3, "decay": 1e-3}
+    searched, sheet, _ = search({f"effects.external_load.{n}": v for n, v in hidden.items()})
+    begun = trial(sheet, ("external_load",)).with_one_size("external_load", "force")
+    x = [
+        unknown.at(slow[unknown.path.rsplit(".", 1)[1]]) if not unknown.toleranced else 0.0
+        for unknown in begun.unknowns.members
+    ]
+    found = searched.whole.fitted(begun.at(np.array(x))).machine.effects.external_load
+    assert (found.frequency, found.phase, found.decay, found.mean) == (0.0, 0.0, 0.0, 0.0)
+    assert found.force == pytest.approx(-1200.0, rel=0.01)
+    assert found.start == pytest.approx(4.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes"),
+    [
+        ("flow_gain_drift", {"change": 0.3, "time_constant": 1e5}),
+        ("valve_gain_asymmetry", {"lifting": 0.1}),
+    ],
+)
+def test_a_gain_at_the_inlet_alone_is_found(effect: str, sizes: dict[str, float]) -> None:
+    """Of both metering edges it would be another flow back, too."""
+    values = {f"effects.{effect}.{name}": value for name, value in sizes.items()}
+    begun = search(values | {f"effects.{effect}.inlet_share": 1.0})
+    found = begun[0].run()
+    assert [each.effects for each in found] == [(effect,)]
+    shown = begun[0].whole.fitted(found[0]).machine.effects
+    assert getattr(shown, effect).inlet_share == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_size_as_large_as_is_looked_for_is_named_with_what_comes_closest() -> None:

@@ -331,15 +331,20 @@ def _diagnose(words: list[str]) -> int:
     from emir_analysis.diagnosis import actuator, command, summary
     from emir_plant.actuator import is_actuator
 
-    parser = argparse.ArgumentParser(prog="emir diagnose")
+    parser = argparse.ArgumentParser(
+        prog="emir diagnose",
+        description="What a machine has that its data sheet lacks: nothing_missing, found (which"
+        " effects), ambiguous (which ones, and what would tell them apart) or unexplained (which"
+        " balance, how large, against what).",
+    )
     parser.add_argument("bag", type=Path, nargs="+", help="recordings to find out from")
     parser.add_argument(
         "--datasheet", type=Path, metavar="FILE",
-        help="YAML of the machine (default: joint 1 as the plant node has it)",
+        help="YAML of the machine, values and tolerances (default: EMIR's main joint)",
     )  # fmt: skip
     parser.add_argument(
         "--signals", type=Path, metavar="FILE",
-        help="YAML: signal, topic, field (default: the graph's topics)",
+        help="YAML: signal, topic, field, unit (default: the topics of `emir run`)",
     )  # fmt: skip
     parser.add_argument(
         "--judge", type=Path, nargs="+", action="extend", metavar="BAG",

@@ -63,6 +63,8 @@ def _of_findings(findings: Findings) -> str:
         )
         if findings.curve is None:
             remainder += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
+            if speaking == "force" and _is_untold(shape, findings.swing, lies):
+                remainder += ", as of a load from outside whose course is none that is looked for"
     if findings.verdict == "unexplained":
         known = "" if findings.rejected is None else f"{closest(findings.rejected)}; "
         left = remainder or "the balances are quiet, but the free run drifts away"
@@ -177,10 +179,15 @@ def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
     if shape.share < TOLD and lies.level is not None:
         unit = "" if lies.unit == "1" else f" {lies.unit}"
         return f"nearly all of it lies where {lies.signal} is {lies.side} {lies.level:.3g}{unit}"
-    if shape.share < TOLD:
+    if _is_untold(shape, swing, lies):
         return "no single signal predicts it"
     direction = " and the direction of motion" if shape.by_direction else ""
     return f"{shape.predictor or 'a constant'}{direction} predicts {100 * shape.share:.0f} % of it"
+
+
+def _is_untold(shape: Shape, swing: Swing | None, lies: Where) -> bool:
+    """Tell whether neither a signal nor time says anything of what is left."""
+    return swing is None and lies.level is None and shape.share < TOLD
 
 
 def at_end(findings: Findings) -> tuple[str, ...]:

@@ -130,7 +130,7 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     (effect,) = result.effects
     assert (effect.name, effect.balance) == ("coulomb_friction", "force")
     assert effect.parameters["force"].value == pytest.approx(15e3, rel=0.02)
-    told = re.search(r"coulomb_friction\.force +(\S+)  \(.* \.\.\. .*\) N\n", summary(result))
+    told = re.search(r"coulomb_friction\.force +(\S+) N  \(.* \.\.\. .*\)  F_c\n", summary(result))
     assert told is not None
     assert float(told[1]) == pytest.approx(15e3, rel=0.02)
     for signal in result.signals.values():

@@ -177,7 +177,7 @@ def diagnosis(
     return Diagnosis(
         verdict=verdict(findings, judged),
         statement=statement(findings, judged),
-        effects=_effects(findings, fitted),
+        effects=effect_results(findings.chosen, fitted),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
         tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
@@ -243,18 +243,21 @@ def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, 
     }
 
 
-def _effects(findings: Findings, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:
-    """Return the effects with their fitted parameters, and shapes that were fixed at the end."""
+def effect_results(chosen: Trial, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:
+    """Return a trial's effects with their fitted parameters, and those that were fixed at the end.
+
+    fitted: by dotted path.
+    """
     found = []
-    for name in findings.chosen.effects:
+    for name in chosen.effects:
         kind = REGISTRY[name]
-        effect = getattr(findings.chosen.machine.effects, name)
+        effect = getattr(chosen.machine.effects, name)
         parameters = {}
         for parameter, about in quantities(kind).items():
             path = f"effects.{name}.{parameter}"
             if path in fitted:
                 parameters[parameter] = replace(fitted[path], meaning=about.meaning)
-            elif parameter not in kind.sizes:
+            elif parameter not in kind.sizes or getattr(effect, parameter) != 0.0:
                 value = float(getattr(effect, parameter))
                 parameters[parameter] = ParameterResult(
                     value, about.unit, value, value, (), about.meaning

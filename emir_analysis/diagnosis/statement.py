@@ -214,8 +214,8 @@ def closest(rejected: Trial) -> str:
     ends = [path for path in _ends(rejected) if path.startswith("effects.")]
     said = [f"{path} = {values[path][1]:.3g} {values[path][0].unit}" for path in ends]
     led = f", {' and '.join(said)} at the end of what is looked for," if said else ""
-    come = "come" if len(rejected.effects) > 1 else "comes"
-    return f"{' and '.join(rejected.effects)} {come} closest{led} but leaves too much"
+    s = "" if len(rejected.effects) > 1 else "s"
+    return f"{' and '.join(rejected.effects)} come{s} closest{led} but leave{s} too much"
 
 
 def tell_apart(findings: Findings) -> str | None:

@@ -90,7 +90,8 @@ class Curves:
                 friction = friction.without(effect)
         fitted = [fit_balances(each, self._evidence, self._floor) for each in (named, friction)]
         as_named, even = (self._about(each) for each in fitted)
-        return even.with_force_in_motion() < as_named.as_it_is() - STRONG
+        without = min(as_named.as_it_is(), even.as_it_is())
+        return even.with_force_in_motion() < without - STRONG
 
     def measured_instead(self, named: Trial) -> Trial | None:
         """Return the same where a curve says clearly what effects only come near.

@@ -113,14 +113,13 @@ class Whole:
             return fitted
         start = f"effects.{LOAD}."
         paths = [unknown.path for unknown in fitted.unknowns.members]
-        if start + "force" not in paths:
-            return fitted
-        load = fitted.machine.effects.external_load
-        steady, k = load.force * math.cos(load.phase) + load.mean, paths.index(start + "force")
-        x = fitted.x.copy()
-        x[k] = fitted.unknowns.members[k].at(steady)
-        still = fitted.at(x)
-        for name in ("mean", "frequency", "phase", "decay"):
+        load, still = fitted.machine.effects.external_load, fitted
+        if start + "force" in paths:
+            k, x = paths.index(start + "force"), fitted.x.copy()
+            steady = load.force * math.cos(load.phase) + load.mean
+            x[k] = fitted.unknowns.members[k].at(steady)
+            still = fitted.at(x).fixed(start + "mean", 0.0)
+        for name in ("frequency", "phase", "decay"):
             still = still.fixed(start + name, 0.0)
         lasting = fitted.fixed(start + "decay", 0.0)
         ways = [refine_free_run(still, self._evidence), lasting]

@@ -136,6 +136,7 @@ BETWEEN = np.linspace(-0.3, 0.3, POINTS)  # m/s
         ({"unnamed_force.over": 2, "unnamed_force.first": BETWEEN[0],
           "unnamed_force.last": BETWEEN[-1],
           "unnamed_force.along": (-4.5e3 * (np.abs(BETWEEN) > 1e-3)).tolist()}, True),
+        ({}, False),
         ({"effects.sensor_bias.pressure_lifting": 1e5}, False),
         ({"effects.internal_leakage.coefficient": 1e-12}, False),
     ],

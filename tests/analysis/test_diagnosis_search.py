@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.result import effect_results
 from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
@@ -362,6 +363,15 @@ def test_a_share_finds_back_from_the_wrong_end() -> None:
     found = searched.whole.fitted(both.at(np.array(begun)))
     assert found.machine.effects.valve_hysteresis.command_share == pytest.approx(1.0, abs=0.01)
     assert found.machine.effects.entrained_air.share == pytest.approx(0.01, rel=0.02)
+
+
+def test_a_size_that_was_set_to_all_of_it_is_still_told() -> None:
+    """A block piloted by the other chamber alone: that share is fitted no more, but the finding."""
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    alone = trial(sheet, ("logic_block_fault",)).with_one_size("logic_block_fault", "pilot")
+    piloted = alone.fixed("effects.logic_block_fault.pilot", 1.0)
+    (effect,) = effect_results(piloted, {})
+    assert [(n, p.value) for n, p in effect.parameters.items()] == [("pilot", 1.0)]
 
 
 def test_a_load_that_hardly_swings_while_it_acts_is_steady() -> None:

@@ -11,29 +11,31 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class Backlash(Effect):
-    """Offset s of the piston against the joint, T ds/dt = (gap / 2) tanh(F / F_s) - s.
+    """Offset s of the piston against the joint, T ds/dt = (gap / 2) [tanh(F / F_s) + F / F_p] - s.
 
     F is the oil's force: well above the seating force F_s the piston rests on one flank, well
     below -F_s on the other, and in between it is on its way. For gradual_share of it
-    F / sqrt(F^2 + F_s^2) in place of tanh(F / F_s).
+    F / sqrt(F^2 + F_s^2) in place of tanh(F / F_s). A pin is a spring, too: F_p bends it by half
+    the gap.
     """
 
     balance: ClassVar[Balance] = "kinematics"
     sizes: ClassVar[tuple[str, ...]] = ("gap",)
     source: ClassVar[str] = "worn pins and bushings, 0.1-1 mm"
-    trial: ClassVar[dict[str, float]] = {"gap": 5e-4, "gradual_share": 0.5}
+    trial: ClassVar[dict[str, float]] = {"gap": 5e-4, "gradual_share": 0.5, "pin_force": 5e6}
 
     gap: float = quantity("m", 0.0, 1e-2, "from flank to flank", default=0.0)
     seating_force: float = quantity("N", 1e3, 1e6, "F_s, at which a flank is met", default=2e4)
     gradual_share: float = quantity("1", 0.0, 1.0, "of F/sqrt(F^2 + F_s^2)", default=0.0)
     crossing_time: float = quantity("s", 0.01, 0.5, "T, of the film in the bearing", default=0.01)
+    pin_force: float = quantity("N", 1e4, 1e12, "F_p, bends the pin by gap / 2", default=1e12)
 
 
 @compiled
 def flank(force: float, p: Any) -> float:
     """Return where the piston rests against the joint, m, under a steady force, N."""
     seated = smooth_sign(force / p.backlash_seating_force, p.backlash_gradual_share)
-    return 0.5 * p.backlash_gap * seated
+    return 0.5 * p.backlash_gap * (seated + force / p.backlash_pin_force)
 
 
 @compiled
@@ -51,5 +53,6 @@ def settling_rate(stiffness: float, force: float, p: Any) -> float:
     stiffness: of the oil against the piston's motion, N/m.
     """
     steep = slope(force / p.backlash_seating_force, p.backlash_gradual_share)
-    yielding = 0.5 * p.backlash_gap / p.backlash_seating_force * steep  # m/N
+    steep = steep / p.backlash_seating_force + 1.0 / p.backlash_pin_force
+    yielding = 0.5 * p.backlash_gap * steep  # m/N
     return (1.0 + yielding * stiffness) / p.backlash_crossing_time

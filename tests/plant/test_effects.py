@@ -368,6 +368,17 @@ def test_play_shifts_the_piston_by_the_gap_when_the_force_changes_sign() -> None
     assert shift[0] - shift[1] == pytest.approx(gap, rel=1e-3)
 
 
+def test_a_pin_gives_way_in_proportion_to_the_force() -> None:
+    """Beside the half gap; the joint stays where it is."""
+    stiffness = 1e9  # N/m
+    plant = _with(backlash={"gap": 2e-3, "pin_force": 1e-3 * stiffness})
+    for angle in (0.9, 1.3):
+        rest = plant.outputs(plant.initial(angle, 20e5))
+        stated = linkage.stroke(angle, plant.record[0])
+        assert rest.angle == pytest.approx(angle)
+        assert rest.stroke - stated == pytest.approx(1e-3 + rest.force / stiffness, rel=1e-9)
+
+
 @pytest.mark.parametrize("gradual_share", [0.0, 1.0])
 def test_crossing_the_play_is_followed_by_the_integration(gradual_share: float) -> None:
     """Upright the boom swings from flank to flank; a fourth of the step changes little."""

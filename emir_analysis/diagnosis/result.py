@@ -69,6 +69,13 @@ class ParameterResult:
         return value, low, high
 
 
+def parameter_line(name: str, p: ParameterResult, unit: str) -> str:
+    """Return a parameter as a line for a terminal, in a unit as it is called there."""
+    value, low, high = p.told
+    shown = "" if unit == "1" else f" {unit}"
+    return f"{name:40}{value:>11}{shown}  ({low} ... {high})  {p.meaning}"
+
+
 @dataclass(frozen=True)
 class EffectResult:
     """An effect that the machine has, with its parameters by name."""

@@ -1,6 +1,6 @@
 """The result of a diagnosis as lines for a terminal."""
 
-from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult
+from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult, parameter_line
 
 
 def summary(result: Diagnosis) -> str:
@@ -27,14 +27,7 @@ def summary(result: Diagnosis) -> str:
 
 def _sizes(effect: EffectResult) -> list[str]:
     """Return an effect's parameters with their intervals, a line for each."""
-    lines = []
-    for name, p in effect.parameters.items():
-        value, low, high = p.told
-        unit = "" if p.unit == "1" else f" {p.unit}"
-        lines.append(
-            f"{effect.name + '.' + name:40}{value:>11}{unit}  ({low} ... {high})  {p.meaning}"
-        )
-    return lines
+    return [parameter_line(f"{effect.name}.{n}", p, p.unit) for n, p in effect.parameters.items()]
 
 
 def cautions(result: Diagnosis) -> list[str]:

@@ -186,15 +186,13 @@ class _Balances:
         kind = next(k for k in KINDS if k.over == BY_VELOCITY)
         first, last = ends(kind, self._evidence)
         moving = np.abs(np.linspace(first, last, POINTS)) > 0.5 * (last - first) / (POINTS - 1)
-        values = {"over": kind.code, "first": first, "last": last}
         size = self._size(kind)
-        values |= {f"along.{k}": size * on for k, on in enumerate(moving)}
-        machine = with_values(
-            self._known.machine, {f"{kind.group}.{name}": value for name, value in values.items()}
-        )
+        values = {f"{kind.group}.along.{k}": size * on for k, on in enumerate(moving)}
+        machine = with_values(self._known.machine, self._named(kind) | values)
         pushed = self._evidence.in_noise(self._evidence.residuals([machine]), self._floor)[0]
-        slopes = np.column_stack([self._slopes, np.nan_to_num(pushed - self._missing)])
-        left = self._missing - slopes @ np.linalg.lstsq(slopes, self._missing, rcond=None)[0]
+        slope = np.nan_to_num(pushed - self._missing)[:, None]
+        anything = np.array([np.inf])
+        _, left = self._least(slope, np.zeros((0, 1)), (-anything, anything))
         return self._score(left, self._known.x.size + 1)
 
     def best(self, forms: Sequence[_Form]) -> _Begun | None:
@@ -206,9 +204,7 @@ class _Balances:
         told = told_forms(kind, self._evidence)
         if not told:
             return []
-        first, last = ends(kind, self._evidence)
-        values = {"over": kind.code, "first": first, "last": last}
-        named = {f"{kind.group}.{name}": value for name, value in values.items()}
+        named = self._named(kind)
         machine = with_values(self._known.machine, named)
         names = dict.fromkeys(name for form in told for name in form)
         points = {name: _points(kind, name, self._size(kind)) for name in names}
@@ -221,6 +217,12 @@ class _Balances:
             )
             for form in told
         ]
+
+    def _named(self, kind: Kind) -> dict[str, float]:
+        """Return over what a kind's curves run, by dotted path."""
+        first, last = ends(kind, self._evidence)
+        values = {"over": kind.code, "first": first, "last": last}
+        return {f"{kind.group}.{name}": value for name, value in values.items()}
 
     def _size(self, kind: Kind) -> float:
         """Return the size of what is missing, in the unit of a kind's curves."""
@@ -244,27 +246,35 @@ class _Balances:
         return np.asarray(np.nan_to_num((missing - self._missing).T))
 
     def _smoothest(self, form: _Form) -> _Begun:
-        """Return the trial by least squares, parameters and points inside their bounds.
-
-        Curves' second differences are expected to be small beside their size, parameters to be as
-        stated.
-        """
+        """Return the trial whose curves' second differences are small beside their size."""
         known = self._known
-        stated = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
         count = len(form.points) // POINTS
         bending = np.asarray(np.kron(np.eye(count), BENDING), dtype=np.float64)
-        straight = np.hstack([self._slopes, form.slopes])
-        rows = np.vstack([straight, block_diag(stated, bending)])
-        wanted = np.concatenate([-self._missing, -stated @ known.x, np.zeros(len(bending))])
         machine = with_values(known.machine, form.named)
         everything = Unknowns(machine, (*known.unknowns.members, *form.points))
-        begin, (low, high) = np.append(known.x, np.zeros(len(form.points))), everything.bounds
-        room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
-        x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
-        left = self._missing + straight @ (x - begin)
+        x, left = self._least(form.slopes, bending, Unknowns(machine, form.points).bounds)
         share = 1.0 - _above_noise(left) / _above_noise(self._missing)
         criterion = self._criterion(left, form.slopes, bending)
         return _Begun(_with_smoothing(everything, x), criterion, share)
+
+    def _least(
+        self, slopes: Array, expected: Array, bounds: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
+        """Return parameters and what is beside them by least squares, (k + j,), and the rest, (n,).
+
+        Parameters are expected to be as stated. slopes: (n, j) by what is beside them; expected:
+        (r, j), of which it is expected to make little; bounds: (j,) each, of it.
+        """
+        known = self._known
+        stated = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
+        straight = np.hstack([self._slopes, slopes])
+        rows = np.vstack([straight, block_diag(stated, expected)])
+        wanted = np.concatenate([-self._missing, -stated @ known.x, np.zeros(len(expected))])
+        begin = np.append(known.x, np.zeros(slopes.shape[1]))
+        low, high = map(np.append, known.unknowns.bounds, bounds)
+        room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
+        x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
+        return x, self._missing + straight @ (x - begin)
 
     def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
         """Return a Bayesian criterion of what is left, (n,), in units of the noise.

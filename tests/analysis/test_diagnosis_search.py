@@ -26,7 +26,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
-from emir_analysis.diagnosis.result import effect_results
+from emir_analysis.diagnosis.result import ParameterResult, effect_results
 from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
@@ -372,6 +372,16 @@ def test_a_size_that_was_set_to_all_of_it_is_still_told() -> None:
     piloted = alone.fixed("effects.logic_block_fault.pilot", 1.0)
     (effect,) = effect_results(piloted, {})
     assert [(n, p.value) for n, p in effect.parameters.items()] == [("pilot", 1.0)]
+
+
+@pytest.mark.parametrize(("half_width", "figures"), [(0.3, 3), (4e-3, 3), (5e-5, 5), (0.0, 3)])
+def test_an_interval_has_the_digits_that_tell_its_ends_apart(
+    half_width: float, figures: int
+) -> None:
+    low, high = 0.98 - half_width, 0.98 + half_width
+    shown = ParameterResult(0.98, "1", low, high, ()).told
+    assert [float(s) for s in shown] == pytest.approx([0.98, low, high], abs=0.11 * half_width)
+    assert max(len(s.replace(".", "").lstrip("0")) for s in shown) <= figures
 
 
 def test_a_load_that_hardly_swings_while_it_acts_is_steady() -> None:

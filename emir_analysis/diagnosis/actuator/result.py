@@ -18,6 +18,7 @@ from emir_analysis.diagnosis.result import (
     ParameterResult,
     SignalResult,
     confounded,
+    parameter_line,
 )
 from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
@@ -194,10 +195,7 @@ def summary(result: ActuatorDiagnosis) -> str:
     lines = [f"{result.verdict}: {result.statement}", f"({result.not_told})", ""]
     for effect in result.effects:
         for name, p in effect.parameters.items():
-            value, low, high = p.told
-            unit = "" if p.unit == "1" else f" {_unit(p.unit, result)}"
-            about = f"{value:>11}{unit}  ({low} ... {high})  {p.meaning}"
-            lines.append(f"{effect.name + '.' + name:40}{about}")
+            lines.append(parameter_line(f"{effect.name}.{name}", p, _unit(p.unit, result)))
     i, ahead = result.tests[PRESSURE].intervals, result.one_step[PRESSURE]
     figures = "  " + ", ".join(f"{label} {getattr(s, n):.3f}" for n, label in LABELS.items())
     lines += [

@@ -42,7 +42,7 @@ MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 SETTLING = 2.0  # of play and oil in a step; Runge-Kutta 4 is unstable above 2.8
-FASTEST = 0.3  # m/s, of a piston: more than valve (EMIR: Q_n / A_H = 55 mm/s) and swinging boom make
+FASTEST = 0.3  # m/s, of a piston: more than a valve (EMIR: Q_n / A_H = 55 mm/s) and a swing make
 FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging
 
 

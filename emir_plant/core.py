@@ -197,7 +197,7 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
     beside = unnamed + external_load.on_piston(load, p)
     torque = (motion.force + beside - friction) * motion.arm
     gravity = math.cos(motion.angle)
-    across = external_load.at_tip(load, p)
+    across = external_load.at_tip(load, motion.angle, p)
     for i in range(n):
         dx[MODES + i] = x[MODES + n + i]
         dx[MODES + n + i] = (
@@ -223,7 +223,7 @@ def truth_of(x: Array, p: Any) -> Truth:
     bending = 0.0
     for i in range(p.mode_deflection.size):
         bending += p.mode_deflection[i] * x[MODES + i]
-    load = external_load.at_tip(external_load.force(x[TIME], p), p)
+    load = external_load.at_tip(external_load.force(x[TIME], p), motion.angle, p)
     return Truth(
         motion.angle,
         motion.tip_angle,

@@ -62,7 +62,7 @@ class Plant:
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
         outside = external_load.force(0.0, p)
         load = p["mode_weight"] * math.cos(angle)
-        load -= p["mode_tip"] * external_load.at_tip(outside, p)
+        load -= p["mode_tip"] * external_load.at_tip(outside, angle, p)
         torque = load[0] / p["mode_joint"][0]
         force = torque / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
         force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)

@@ -188,11 +188,9 @@ def _shapes(start: Trial, effect: str) -> Array:
     The trial's own is the first; of more than MOST_SHAPING such fields it is the only one. In
     shares they differ one at a time, in the others in all combinations.
     """
-    members, sizes = start.unknowns.members, REGISTRY[effect].sizes
+    members = start.unknowns.members
     shaping = [
-        k
-        for k, u in enumerate(members)
-        if u.path.startswith(f"effects.{effect}.") and u.path.rsplit(".", 1)[1] not in sizes
+        k for k, u in enumerate(members) if u.shapes and u.path.startswith(f"effects.{effect}.")
     ]
     shares = [k for k in shaping if members[k].is_share]
     others = [k for k in shaping if not members[k].is_share]

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis import black_box
-from emir_analysis.diagnosis.candidates import free_run
+from emir_analysis.diagnosis.balances import level
+from emir_analysis.diagnosis.candidates import fit_balances, fit_free_run, free_run
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -25,11 +28,15 @@ class Judged:
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
     errors (n, 4) of predicting one sample ahead from measured ones, all recordings in one.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
+    surprising: what was found does not explain them. reconciled: nothing was found missing, and
+    other parameters inside the tolerances explain them and the recordings that were fitted.
     """
 
     evidence: Evidence
     runs: dict[str, list[Array]]
     one_step: dict[str, Array]
+    surprising: bool
+    reconciled: bool
 
     def errors(self, stage: str) -> list[Array]:
         """Return simulated minus measured, (n, 4), of each recording."""
@@ -63,7 +70,23 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     one_step[BLACK_BOX] = np.concatenate(
         [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
     )
-    return Judged(evidence, runs, one_step)
+    surprising = not explained(findings.chosen, evidence)
+    reconciled = surprising and findings.verdict == "nothing_missing"
+    reconciled = reconciled and _reconciled(findings, evidence)
+    return Judged(evidence, runs, one_step, surprising, reconciled)
+
+
+def _reconciled(findings: Findings, judge: Evidence) -> bool:
+    """Tell whether parameters alone bring all recordings together to the noise.
+
+    What was fitted may have left some of them open, or have known them from next to nothing.
+    """
+    experiments = [*findings.evidence.experiments, *judge.experiments]
+    both = Evidence(experiments, findings.sheet.machine)
+    balanced = fit_balances(findings.chosen, both, both.floor(findings.chosen.machine))
+    fitted = fit_free_run(balanced, both)
+    left = level(both.residuals([fitted.machine])[0])
+    return at_noise(fitted, both) and quiet(left, limits(fitted.machine, both))
 
 
 def _spread(shown: Array, evidence: Evidence) -> Array:

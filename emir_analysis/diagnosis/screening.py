@@ -7,7 +7,7 @@ those are fitted, the parameters stay inside their tolerances.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -57,13 +57,16 @@ class _Left:
     def __init__(self, known: Trial, missing: Missing, step: float) -> None:
         self.step_size = step
         self._missing = missing
-        stated = known.unknowns.toleranced
+        # what shapes an effect stays: an onset leads nowhere along a straight line
+        moved = np.array([not unknown.shapes for unknown in known.unknowns.members], dtype=bool)
+        stated, x = known.unknowns.toleranced[moved], known.x[moved]
         prior = np.diag(np.where(stated, 1.0 / TOLERANCE_SPREAD, HELD))
-        self._drawn = np.where(stated, known.x, 0.0) / TOLERANCE_SPREAD
-        self._bounds = low, high = known.unknowns.bounds
-        self._x, self._room = known.x, (low - known.x, high - known.x)
-        steps = np.where(known.x + step > high, -step, step)
-        values = missing([known, *(known.at(x) for x in known.x + np.diag(steps))])
+        self._drawn = np.where(stated, x, 0.0) / TOLERANCE_SPREAD
+        low, high = (bound[moved] for bound in known.unknowns.bounds)
+        self._known, self._moved, self._room = known.x, moved, (low - x, high - x)
+        steps = np.where(x + step > high, -step, step)
+        neighbours = known.x + steps[:, None] * np.eye(moved.size)[moved]
+        values = missing([known, *(known.at(x) for x in neighbours)])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
         self._basis, self._triangle = np.linalg.qr(np.vstack([slopes.T, prior]))
 
@@ -80,7 +83,8 @@ class _Left:
         beyond = np.any((changes < self._room[0]) | (changes > self._room[1]), axis=1)
         for k in np.flatnonzero(beyond):
             changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
-        x = np.clip(self._x + changes, *self._bounds)  # rounding leads beyond them
+        x = np.tile(self._known, (len(trials), 1))
+        x[:, self._moved] += np.clip(changes, *self._room)  # rounding leads beyond them
         return residuals + changes @ self._triangle.T @ self._basis.T, x
 
     def runs(self, one: Trial) -> bool:
@@ -132,10 +136,26 @@ class _Candidate:
         """Fit the effects' fields, from where they are best or from where they ought to be."""
         points = np.array([self.x, self._reached])
         begin = points[int(np.argmin([_soft(row) for row in self._inside(points)]))]
-        nothing_held = np.zeros(self.x.size, dtype=bool)
-        problem = Problem(self._inside, begin, *self.bounds, nothing_held)
-        own = fit(problem, ACCURACY, robust=True).x if np.isfinite(self.expected) else self.x
-        return Screened(self._with_parameters(own), _soft(self._inside(own[None])[0]))
+        ends = [self.x]
+        if np.isfinite(self.expected):
+            nothing_held = np.zeros(self.x.size, dtype=bool)
+            problem = Problem(self._inside, begin, *self.bounds, nothing_held)
+            begins = [begin, *self._with_other_shares(begin)]
+            ends = [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
+        costs = [_soft(row) for row in self._inside(np.array(ends))]
+        best = int(np.argmin(costs))
+        return Screened(self._with_parameters(ends[best]), costs[best])
+
+    def _with_other_shares(self, own: Array) -> list[Array]:
+        """Return fields, (k,), with none and with all of each share, between which fits may stop.
+
+        A load's shares say where it acts: with others it would be another load.
+        """
+        if self.effect == LOAD:
+            return []
+        members = self._start.unknowns.members[self._known :]
+        ends = [(k, end) for k, u in enumerate(members) if u.is_share for end in (u.low, u.high)]
+        return [np.where(np.arange(own.size) == k, end, own) for k, end in ends]
 
     def stepped(self, missing: Missing) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
@@ -159,9 +179,8 @@ class _Candidate:
 
     def _sizes(self) -> NDArray[np.bool_]:
         """Tell which unknowns are sizes of the further effects, (n,)."""
-        names = [u.path.split(".") for u in self._start.unknowns.members[self._known :]]
-        sizes = [name in REGISTRY[effect].sizes for _, effect, name in names]
-        return np.array([False] * self._known + sizes)
+        members = self._start.unknowns.members[self._known :]
+        return np.array([False] * self._known + [not unknown.shapes for unknown in members])
 
     def _with_parameters(self, own: Array) -> Trial:
         """Return the trial with fields, (k,), and the known parameters where they do their best.
@@ -319,7 +338,7 @@ def _starts(
     x = np.array([unknown.start for unknown in members])
     if effect == LOAD:
         return [x, *(_fields(members, load, at) for load in loads for at in (AT_TIP, ON_PISTON))]
-    sizes = np.array([u.path.rsplit(".", 1)[1] in REGISTRY[effect].sizes for u in members])
+    sizes = np.array([not unknown.shapes for unknown in members])
     negative = any(u.low < 0.0 for u, size in zip(members, sizes, strict=True) if size)
     allowed = [s for s in STARTS if s > 0.0 or negative]
     switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
@@ -331,8 +350,8 @@ def _starts(
 
 
 def _fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Array:
-    """Return a load as the vector, (9,), of its effect's fields."""
-    values = (*load, piston_share)
+    """Return a load, across the boom where not on the piston, as its effect's fields, (10,)."""
+    values = (*load, piston_share, 0.0)
     return np.array([unknown.at(value) for unknown, value in zip(members, values, strict=True)])
 
 

@@ -37,7 +37,7 @@ from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
 from emir_analysis.diagnosis.whole import LEFT, Progress, Whole
 from emir_plant.sheet import Sheet
 
-MOST_EFFECTS = 2  # that are looked for in one machine
+MOST_EFFECTS = 3  # that are looked for in one machine
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 MOST_OTHERS = 2  # effects beside which is looked where nothing beside the best one suffices

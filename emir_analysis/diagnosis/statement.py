@@ -10,7 +10,7 @@ from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
-from emir_analysis.diagnosis.foresight import explained, parting
+from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
 from emir_analysis.diagnosis.shape import TOLD, Shape
@@ -18,7 +18,6 @@ from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.where import MOST, Where
 from emir_common.parameter_tree import declared
-from emir_plant.effects import REGISTRY
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
@@ -35,8 +34,12 @@ PARTS = {  # of a curve, as they are called
 
 
 def verdict(findings: Findings, judged: Judged) -> str:
-    """Return the verdict: nothing is not missing where the judge recordings show something."""
-    if findings.verdict == "nothing_missing" and _surprised(findings, judged):
+    """Return the verdict: nothing is not missing where the judge recordings show something.
+
+    Other parameters inside the tolerances are no such thing.
+    """
+    surprised = judged.surprising and not judged.reconciled
+    if findings.verdict == "nothing_missing" and surprised:
         return "unexplained"
     return findings.verdict
 
@@ -106,15 +109,10 @@ def _unforeseeable(findings: Findings) -> str:
     )
 
 
-def _surprised(findings: Findings, judged: Judged) -> bool:
-    """Tell whether the judge recordings show what the model does not explain."""
-    return not explained(findings.chosen, judged.evidence)
-
-
 def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.curve is not None:
         return _measured(findings.curve, findings, judged)
-    if findings.verdict == "unexplained" or not _surprised(findings, judged):
+    if findings.verdict == "unexplained" or not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
@@ -122,6 +120,8 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.chosen.effects and off > judged.off(REFITTED):
         worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"
     more = f"shows more{_elsewhere(findings, judged)}"
+    if judged.reconciled:
+        more += ", which other parameters inside the tolerances explain as well"
     return f"; but {judge}, {by}{worse}, {more}: diagnose from that too"
 
 
@@ -196,16 +196,9 @@ def at_end(findings: Findings) -> tuple[str, ...]:
 
 
 def _ends(chosen: Trial) -> tuple[str, ...]:
+    """Return what stands at an end of what is allowed; what shapes an effect ends in a limit."""
     together = zip(chosen.unknowns.members, chosen.x, strict=True)
-    ends = [unknown.path for unknown, x in together if unknown.at_end(float(x))]
-    return tuple(path for path in ends if not _shapes(path))
-
-
-def _shapes(path: str) -> bool:
-    """Tell whether a parameter is an effect's and no size: it then ends in a limit case."""
-    group, _, field = path.partition(".")
-    effect, _, name = field.partition(".")
-    return group == "effects" and name not in REGISTRY[effect].sizes
+    return tuple(u.path for u, x in together if u.at_end(float(x)) and not u.shapes)
 
 
 def closest(rejected: Trial) -> str:

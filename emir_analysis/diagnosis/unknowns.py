@@ -61,6 +61,12 @@ class Unknown:
         low, high = self.value(self.low), self.value(self.high)
         return self.unit == "1" and abs(low) < END and abs(high - 1.0) < END
 
+    @property
+    def shapes(self) -> bool:
+        """Tell whether it shapes an effect, as an onset or a time constant does: is no size."""
+        group, *names = self.path.split(".")
+        return group == "effects" and names[1] not in REGISTRY[names[0]].sizes
+
     def at_end(self, x: float) -> bool:
         """Tell whether x was led to the end of what is allowed.
 

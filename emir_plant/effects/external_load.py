@@ -16,9 +16,10 @@ class ExternalLoad(Effect):
     s = t - t_0, the time since it set in. All of it has come after a rise, and after its duration
     it falls as it rose; both along straight lines. With t_0 long before the run the machine rests
     under it. f = 0 gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one
-    about a mean M. For piston_share of it a force along the piston's rod instead, outward positive,
-    L / b times as large: at the longest lever arm b it has the moment of the one at the TCP, and
-    bends no arm.
+    about a mean M. For vertical_share of it the force is vertical, as a weight is, so that it acts
+    by the cosine of the boom's angle. For piston_share of it a force along the piston's rod
+    instead, outward positive, L / b times as large: at the longest lever arm b it has the moment
+    of the one at the TCP, and bends no arm.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -34,6 +35,7 @@ class ExternalLoad(Effect):
         "duration": 1e3,
         "decay": 0.05,
         "piston_share": 0.5,
+        "vertical_share": 0.5,
     }
 
     force: float = quantity("N", -1e5, 1e5, "F", default=0.0)
@@ -45,6 +47,9 @@ class ExternalLoad(Effect):
     duration: float = quantity("s", 1e-3, 1e6, "how long it acts", default=1e6)
     decay: float = quantity("1/s", 0.0, 10.0, "d, of the swing", default=0.0)
     piston_share: float = quantity("1", 0.0, 1.0, "of it, on the piston's rod", default=0.0)
+    vertical_share: float = quantity(
+        "1", 0.0, 1.0, "of the rest, vertical, not across the boom", default=0.0
+    )
 
 
 @compiled
@@ -61,9 +66,10 @@ def force(time: float, p: Any) -> float:
 
 
 @compiled
-def at_tip(load: float, p: Any) -> float:
-    """Return what of a load, N, acts across the boom at the TCP, N."""
-    return (1.0 - p.external_load_piston_share) * load
+def at_tip(load: float, angle: float, p: Any) -> float:
+    """Return what of a load, N, acts across a boom at an angle, rad, at the TCP, N."""
+    across = 1.0 - p.external_load_vertical_share * (1.0 - math.cos(angle))
+    return (1.0 - p.external_load_piston_share) * across * load
 
 
 @compiled

@@ -3,6 +3,7 @@
 The registry knows these forms, so `found` with the name before the ~ is the right answer.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,27 @@ class LoadOnPiston(Hidden):
         left = self.sizes["leans_for"] - since
         force = self.sizes["leans"] * min(max(min(since, left) / self.COMES, 0.0), 1.0)
         return super().accelerations(x, time, angle, push + force)
+
+
+class HangingLoad(Hidden):
+    """A weight that is hung on or taken off: vertical, at any angle of the boom."""
+
+    name = "external_load~vertical"
+    grows = ("hung_on",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "hung_on": either_sign(random, 500.0, 2500.0),
+            "hung_at": random.uniform(5.0, 25.0),
+            "swings_at": float(random.choice([0.0, between(random, 0.1, 0.4)])),
+        }
+
+    def weight(self, time: float, angle: float) -> Array:
+        since = time - self.sizes["hung_at"]
+        swing = math.cos(2.0 * math.pi * self.sizes["swings_at"] * since)
+        hung = self.sizes["hung_on"] * swing if since >= 0.0 else 0.0
+        return super().weight(time, angle) - self.boom.tip * hung * math.cos(angle)
 
 
 class SlowLoad(Hidden):
@@ -225,6 +247,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     DriftAtInlet,
     AsymmetryAtInlet,
     LoadOnPiston,
+    HangingLoad,
     SlowLoad,
     SwingAboutMean,
     OtherOil,

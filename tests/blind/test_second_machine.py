@@ -185,6 +185,10 @@ FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
             "piston_share": 1.0,
         },
     ),
+    _OTHER["external_load~vertical"]: (
+        {"hung_on": -1e3, "hung_at": 0.7, "swings_at": 0.4},
+        {"force": -1e3, "frequency": 0.4, "start": 0.7, "vertical_share": 1.0},
+    ),
     _OTHER["external_load~slow"]: (
         {"pull": 1e3, "comes_at": 0.7, "comes_in": 0.8, "stays": 2.0},
         {"force": 1e3, "start": 0.7, "rise": 0.8, "duration": 2.0},

@@ -29,7 +29,7 @@ from emir_plant.effects import (
     vessel_compliance,
 )
 from emir_plant.hydraulics import logic_block, valve
-from emir_plant.parameters import Machine
+from emir_plant.parameters import GRAVITY, Machine
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure, readings
 from emir_plant.sheet import joint1, load_sheet
@@ -305,6 +305,16 @@ def test_a_load_on_the_piston_is_carried_by_the_oil_and_bends_no_arm(degrees: fl
     pushed = 1e3 * g.boom_length / g.triangle_b
     assert before.force - after.force == pytest.approx(pushed)
     assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 70.0])
+def test_a_vertical_load_is_a_weight(degrees: float) -> None:
+    angle = math.radians(degrees)
+    pulled = _with(external_load={"mean": -100.0 * GRAVITY, "vertical_share": 1.0})
+    heavier = _with(payload={"mass": 100.0})
+    one, other = (m.outputs(m.initial(angle, 20e5)) for m in (pulled, heavier))
+    assert one.force == pytest.approx(other.force)
+    assert one.tcp_deflection == pytest.approx(other.tcp_deflection)
 
 
 def test_a_load_acts_from_its_start_for_its_duration() -> None:

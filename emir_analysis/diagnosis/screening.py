@@ -63,7 +63,8 @@ class _Left:
         prior = np.diag(np.where(stated, 1.0 / TOLERANCE_SPREAD, HELD))
         self._drawn = np.where(stated, x, 0.0) / TOLERANCE_SPREAD
         low, high = (bound[moved] for bound in known.unknowns.bounds)
-        self._known, self._moved, self._room = known.x, moved, (low - x, high - x)
+        self._known, self._moved = known.x, moved
+        self._bounds, self._room = (low, high), (low - x, high - x)
         steps = np.where(x + step > high, -step, step)
         neighbours = known.x + steps[:, None] * np.eye(moved.size)[moved]
         values = missing([known, *(known.at(x) for x in neighbours)])
@@ -84,7 +85,8 @@ class _Left:
         for k in np.flatnonzero(beyond):
             changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
         x = np.tile(self._known, (len(trials), 1))
-        x[:, self._moved] += np.clip(changes, *self._room)  # rounding leads beyond them
+        # rounding leads beyond them
+        x[:, self._moved] = np.clip(self._known[self._moved] + changes, *self._bounds)
         return residuals + changes @ self._triangle.T @ self._basis.T, x
 
     def runs(self, one: Trial) -> bool:
@@ -147,12 +149,7 @@ class _Candidate:
         return Screened(self._with_parameters(ends[best]), costs[best])
 
     def _with_other_shares(self, own: Array) -> list[Array]:
-        """Return fields, (k,), with none and with all of each share, between which fits may stop.
-
-        A load's shares say where it acts: with others it would be another load.
-        """
-        if self.effect == LOAD:
-            return []
+        """Return fields, (k,), with none and with all of each share, between which fits may stop."""
         members = self._start.unknowns.members[self._known :]
         ends = [(k, end) for k, u in enumerate(members) if u.is_share for end in (u.low, u.high)]
         return [np.where(np.arange(own.size) == k, end, own) for k, end in ends]

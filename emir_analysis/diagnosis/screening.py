@@ -149,7 +149,7 @@ class _Candidate:
         return Screened(self._with_parameters(ends[best]), costs[best])
 
     def _with_other_shares(self, own: Array) -> list[Array]:
-        """Return fields, (k,), with none and with all of each share, between which fits may stop."""
+        """Return fields, (k,), with none and all of each share; fits may stop in between."""
         members = self._start.unknowns.members[self._known :]
         ends = [(k, end) for k, u in enumerate(members) if u.is_share for end in (u.low, u.high)]
         return [np.where(np.arange(own.size) == k, end, own) for k, end in ends]

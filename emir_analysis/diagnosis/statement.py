@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
+from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
@@ -122,6 +123,8 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     more = f"shows more{_elsewhere(findings, judged)}"
     if judged.reconciled:
         more += ", which other parameters inside the tolerances explain as well"
+    if LOAD in findings.chosen.effects:
+        more += "; a load from outside may have come at other times there"
     return f"; but {judge}, {by}{worse}, {more}: diagnose from that too"
 
 

@@ -21,17 +21,19 @@ from emir_analysis.diagnosis.candidates import (
     refine_free_run,
     trial,
 )
-from emir_analysis.diagnosis.diagnose import loudest
+from emir_analysis.diagnosis.diagnose import diagnose, loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
 from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
     SEEN,
     STRONG,
+    at_noise,
     balance_score,
     free_run_score,
     limits,
@@ -39,7 +41,7 @@ from emir_analysis.diagnosis.select import (
     speaks,
 )
 from emir_analysis.diagnosis.starts import Starts
-from emir_analysis.diagnosis.statement import closest
+from emir_analysis.diagnosis.statement import closest, statement, verdict
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_common.parameter_tree import with_values
@@ -252,6 +254,37 @@ def test_a_load_that_swings_about_a_mean_from_before_the_start_is_begun_so() -> 
     assert across * load.mean == pytest.approx(-600.0, rel=0.02)
     assert across * abs(load.force) == pytest.approx(300.0, rel=0.02)
     assert load.frequency == pytest.approx(0.175, rel=0.02)
+
+
+@pytest.mark.parametrize(("payload", "reconciled"), [(0.0, True), (200.0, False)])
+def test_a_judge_recording_lacks_nothing_that_other_parameters_explain(
+    payload: float, *, reconciled: bool
+) -> None:
+    """Oil half a tolerance off, as if what was fitted had not told; the payload is no parameter."""
+    _, sheet, evidence = search({})
+    found = diagnose(evidence.experiments, sheet, lambda _: None)
+    assert found.verdict == "nothing_missing"
+    paths = [unknown.path for unknown in found.refitted.unknowns.members]
+    off = found.refitted.x.copy()
+    off[paths.index("cylinder.beta")] += 0.5
+    off_there = replace(found, chosen=found.refitted.at(off), refitted=found.refitted.at(off))
+    _, _, other = search({"effects.payload.mass": payload})
+    judgement = judged(off_there, other.experiments)
+    assert judgement.surprising
+    assert judgement.reconciled == reconciled
+    assert verdict(off_there, judgement) == ("nothing_missing" if reconciled else "unexplained")
+    said = "which other parameters inside the tolerances explain as well: diagnose from that too"
+    assert (said in statement(off_there, judgement)) == reconciled
+
+
+def test_three_effects_are_found_together() -> None:
+    hidden = {"effects.payload.mass": 200.0, "effects.command_delay.delay": 0.03}
+    searched, _, evidence = search(hidden | SHIFT)
+    found = searched.whole.fitted(searched.run()[0])
+    assert set(found.effects) == {"payload", "command_delay", "valve_null_offset"}
+    assert at_noise(found, evidence)
+    for path, value in (hidden | SHIFT).items():
+        assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
 
 
 def test_of_a_short_recording_a_balance_may_hold_more() -> None:

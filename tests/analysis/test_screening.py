@@ -40,6 +40,23 @@ def test_a_robust_fit_goes_on_after_steps_that_were_too_long() -> None:
     assert found.x == pytest.approx([0.214, 1.6], abs=5e-5)
 
 
+def test_what_shapes_an_effect_is_not_moved_along_straight_lines() -> None:
+    """The best start of a load that sets in at 5 s lies, by its slope there, at 9 s."""
+    members = unknowns(Sheet(joint1(), {"cylinder.beta": 0.15}, {}, ()), ("external_load",))
+    x = members.start.copy()
+    paths = [unknown.path.rsplit(".", 1)[1] for unknown in members.members]
+    wanted = x + np.isin(paths, ["beta", "force", "start", "phase", "piston_share"]) * 0.4
+    known = Trial(("external_load",), members, x, np.full((x.size, x.size), np.nan))
+
+    def missing(trials: list[Trial]) -> Array:
+        return np.array([1e3 * (one.x - wanted) for one in trials])
+
+    (best,) = _Left(known, missing, 1e-3).inside([known])[1]
+    moved = {name for name, b, a in zip(paths, best, x, strict=True) if abs(b - a) > 1e-3}
+    assert moved == {"beta", "force"}
+    assert best[paths.index("force")] == pytest.approx(x[paths.index("force")] + 0.4, rel=1e-3)
+
+
 def test_parameters_that_do_their_best_stay_inside_their_bounds_to_the_last_digit() -> None:
     """Random straight residuals whose optimum lies far off."""
     members = unknowns(Sheet(joint1(), {}, {}, ()), ("valve_dead_zone_error", "linkage_error"))

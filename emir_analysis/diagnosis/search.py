@@ -38,6 +38,7 @@ from emir_analysis.diagnosis.whole import LEFT, Progress, Whole
 from emir_plant.sheet import Sheet
 
 MOST_EFFECTS = 3  # that are looked for in one machine
+MOST_BESIDE_ENOUGH = 2  # the same where fewer suffice, but more than the noise is left
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 MOST_OTHERS = 2  # effects beside which is looked where nothing beside the best one suffices
@@ -117,7 +118,8 @@ class Search:
             if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
                 equal, best = self._by_beginning(equal, best)
             enough = self._enough(best.trial)
-            if enough and self._excess(best.trial) <= LEFT**2 - 1.0:
+            many = len(best.trial.effects) >= MOST_BESIDE_ENOUGH
+            if enough and (many or self._excess(best.trial) <= LEFT**2 - 1.0):
                 break
         return best, equal, enough
 

@@ -65,7 +65,8 @@ class Unknown:
     def shapes(self) -> bool:
         """Tell whether it shapes an effect, as an onset or a time constant does: is no size."""
         group, *names = self.path.split(".")
-        return group == "effects" and names[1] not in REGISTRY[names[0]].sizes
+        known = group == "effects" and names[0] in REGISTRY  # a curve that has no name is not
+        return known and names[1] not in REGISTRY[names[0]].sizes
 
     def at_end(self, x: float) -> bool:
         """Tell whether x was led to the end of what is allowed.

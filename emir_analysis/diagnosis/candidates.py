@@ -196,8 +196,8 @@ def _shapes(start: Trial, effect: str) -> Array:
     others = [k for k in shaping if not members[k].is_share]
     if len(others) > MOST_SHAPING:
         return start.x[None]
-    points = [_moved(start.x, others, at) for at in product(*(_levels(start, k) for k in others))]
-    points += [_moved(start.x, [k], (at,)) for k in shares for at in _shares(members[k])]
+    points = [moved(start.x, others, at) for at in product(*(_levels(start, k) for k in others))]
+    points += [moved(start.x, [k], (at,)) for k in shares for at in _shares(members[k])]
     return np.array(points)
 
 
@@ -214,7 +214,8 @@ def _shares(share: Unknown) -> tuple[float, float, float]:
     return share.low, share.start, share.high
 
 
-def _moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:
+def moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:
+    """Return a vector, (k,), with other values at some places."""
     point = x.copy()
     point[list(places)] = values
     return point

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis import black_box
-from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.candidates import fit_balances, fit_free_run, free_run
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
-from emir_analysis.diagnosis.select import at_noise, limits, quiet
+from emir_analysis.diagnosis.select import at_noise, leaves_quiet
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -85,8 +84,7 @@ def _reconciled(findings: Findings, judge: Evidence) -> bool:
     both = Evidence(experiments, findings.sheet.machine)
     balanced = fit_balances(findings.chosen, both, both.floor(findings.chosen.machine))
     fitted = fit_free_run(balanced, both)
-    left = level(both.residuals([fitted.machine])[0])
-    return at_noise(fitted, both) and quiet(left, limits(fitted.machine, both))
+    return at_noise(fitted, both) and leaves_quiet(fitted, both)
 
 
 def _spread(shown: Array, evidence: Evidence) -> Array:

@@ -141,8 +141,8 @@ class Diagnosis:
 
     verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words. Where
     nothing is missing in the recordings but something in the judge, it is unexplained, unless
-    other parameters inside the tolerances explain both. rivals:
-    what would do as well where ambiguous. tell_apart: a movement that would tell them apart.
+    other parameters inside the tolerances explain both. rivals: what would do as well where
+    ambiguous. tell_apart: a movement that would tell them apart.
     signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
     one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
     stays unexplained, swing: how that swings with time, where: most of it lies. at_end: parameters

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import SLOPE_STEP, Trial, coarse_errors, settled, trial
+from emir_analysis.diagnosis.candidates import (
+    SLOPE_STEP,
+    Trial,
+    coarse_errors,
+    moved,
+    settled,
+    trial,
+)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
@@ -58,16 +65,16 @@ class _Left:
         self.step_size = step
         self._missing = missing
         # what shapes an effect stays: an onset leads nowhere along a straight line
-        moved = np.array([not unknown.shapes for unknown in known.unknowns.members], dtype=bool)
-        stated, x = known.unknowns.toleranced[moved], known.x[moved]
+        free = np.array([not unknown.shapes for unknown in known.unknowns.members], dtype=bool)
+        stated, x = known.unknowns.toleranced[free], known.x[free]
         prior = np.diag(np.where(stated, 1.0 / TOLERANCE_SPREAD, HELD))
         self._drawn = np.where(stated, x, 0.0) / TOLERANCE_SPREAD
-        low, high = (bound[moved] for bound in known.unknowns.bounds)
-        self._known, self._moved = known.x, moved
+        low, high = (bound[free] for bound in known.unknowns.bounds)
+        self._known, self._free = known.x, free
         self._bounds, self._room = (low, high), (low - x, high - x)
         steps = np.where(x + step > high, -step, step)
-        neighbours = known.x + steps[:, None] * np.eye(moved.size)[moved]
-        values = missing([known, *(known.at(x) for x in neighbours)])
+        neighbours = known.x + steps[:, None] * np.eye(free.size)[free]
+        values = missing([known, *map(known.at, neighbours)])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
         self._basis, self._triangle = np.linalg.qr(np.vstack([slopes.T, prior]))
 
@@ -86,7 +93,7 @@ class _Left:
             changes[k] = lsq_linear(self._triangle, wanted[k], self._room, method="bvls").x
         x = np.tile(self._known, (len(trials), 1))
         # rounding leads beyond them
-        x[:, self._moved] = np.clip(self._known[self._moved] + changes, *self._bounds)
+        x[:, self._free] = np.clip(self._known[self._free] + changes, *self._bounds)
         return residuals + changes @ self._triangle.T @ self._basis.T, x
 
     def runs(self, one: Trial) -> bool:
@@ -108,6 +115,7 @@ class _Candidate:
     def __init__(self, start: Trial, known: int, starts: list[Array], left: _Left) -> None:
         self._start, self._known, self._left = start, known, left
         self.effect = start.effects[-1]
+        self._further = start.unknowns.members[known:]
         low, high = (bound[known:] for bound in start.unknowns.bounds)
         self.bounds = (low, high)
         self.x, self.at_best = self._best(starts)
@@ -127,8 +135,7 @@ class _Candidate:
 
     def _steps(self) -> list[Array]:
         """Return a step, (k,), of each field that is begun in steps."""
-        members = self._start.unknowns.members[self._known :]
-        found = []
+        found, members = [], self._further
         for k, name in enumerate(u.path.split(".") for u in members):
             if name[2] in REGISTRY[name[1]].stepwise:
                 found.append(np.eye(len(members))[k] * members[k].start)
@@ -150,9 +157,9 @@ class _Candidate:
 
     def _with_other_shares(self, own: Array) -> list[Array]:
         """Return fields, (k,), with none and all of each share; fits may stop in between."""
-        members = self._start.unknowns.members[self._known :]
-        ends = [(k, end) for k, u in enumerate(members) if u.is_share for end in (u.low, u.high)]
-        return [np.where(np.arange(own.size) == k, end, own) for k, end in ends]
+        shares = [(k, u) for k, u in enumerate(self._further) if u.is_share]
+        ends = [(k, end) for k, share in shares for end in (share.low, share.high)]
+        return [moved(own, [k], [end]) for k, end in ends if end != own[k]]
 
     def stepped(self, missing: Missing) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
@@ -166,9 +173,9 @@ class _Candidate:
         off[self._known :] = self._reached
         off[self._sizes()] = 0.0
         points = [off + s * (goal.x - off) for s in SHARES]
-        members = self._start.unknowns.members[self._known :]
         known = self._start.x[: self._known]
-        points += [np.append(known, own) for own in _starts(self.effect, members, [], 1.0)]
+        starts = _starts(self.effect, self._further, [], 1.0)
+        points += [np.append(known, own) for own in starts]
         ways = [self._start.at(np.clip(point, low, high)) for point in points]
         costs = [_soft(row) for row in missing(ways)]
         best = int(np.argmin(costs))
@@ -176,8 +183,7 @@ class _Candidate:
 
     def _sizes(self) -> NDArray[np.bool_]:
         """Tell which unknowns are sizes of the further effects, (n,)."""
-        members = self._start.unknowns.members[self._known :]
-        return np.array([False] * self._known + [not unknown.shapes for unknown in members])
+        return np.array([False] * self._known + [not unknown.shapes for unknown in self._further])
 
     def _with_parameters(self, own: Array) -> Trial:
         """Return the trial with fields, (k,), and the known parameters where they do their best.

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.candidates import (
     HOPELESS,
     Trial,
@@ -29,8 +28,7 @@ from emir_analysis.diagnosis.select import (
     balance_score,
     excess,
     free_run_score,
-    limits,
-    quiet,
+    leaves_quiet,
     rivals,
 )
 from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
@@ -385,8 +383,7 @@ class Search:
         return self._quiet(tried) and explained(tried, self._evidence)
 
     def _quiet(self, tried: Trial) -> bool:
-        left = level(self._evidence.residuals([tried.machine])[0])
-        return quiet(left, limits(tried.machine, self._evidence))
+        return leaves_quiet(tried, self._evidence)
 
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import chi2, norm
 
-from emir_analysis.diagnosis.balances import FORCE_WINDOW
+from emir_analysis.diagnosis.balances import FORCE_WINDOW, level
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
@@ -103,6 +103,12 @@ def quiet(left: Array, limit: Array) -> bool:
     NaN, a balance that the signals do not allow, is quiet.
     """
     return not np.any(left > limit)
+
+
+def leaves_quiet(tried: Trial, evidence: Evidence) -> bool:
+    """Tell whether no balance speaks with a trial's machine."""
+    left = level(evidence.residuals([tried.machine])[0])
+    return quiet(left, limits(tried.machine, evidence))
 
 
 def excess(tried: Trial, evidence: Evidence) -> float:

@@ -37,7 +37,7 @@ PARTS = {  # of a curve, as they are called
 def verdict(findings: Findings, judged: Judged) -> str:
     """Return the verdict: nothing is not missing where the judge recordings show something.
 
-    Other parameters inside the tolerances are no such thing.
+    They show nothing where other parameters inside the tolerances explain them, too.
     """
     surprised = judged.surprising and not judged.reconciled
     if findings.verdict == "nothing_missing" and surprised:

@@ -16,10 +16,10 @@ class ExternalLoad(Effect):
     s = t - t_0, the time since it set in. All of it has come after a rise, and after its duration
     it falls as it rose; both along straight lines. With t_0 long before the run the machine rests
     under it. f = 0 gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one
-    about a mean M. For vertical_share of it the force is vertical, as a weight is, so that it acts
-    by the cosine of the boom's angle. For piston_share of it a force along the piston's rod
-    instead, outward positive, L / b times as large: at the longest lever arm b it has the moment
-    of the one at the TCP, and bends no arm.
+    about a mean M. For piston_share of it a force along the piston's rod instead, outward positive,
+    L / b times as large: at the longest lever arm b it has the moment of the one at the TCP, and
+    bends no arm. For vertical_share of the rest it is vertical, as a weight is, and acts by the
+    cosine of the boom's angle.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -67,7 +67,10 @@ def force(time: float, p: Any) -> float:
 
 @compiled
 def at_tip(load: float, angle: float, p: Any) -> float:
-    """Return what of a load, N, acts across a boom at an angle, rad, at the TCP, N."""
+    """Return what of a load, N, acts across the boom at the TCP, N, up positive.
+
+    angle: of the boom to the horizontal, rad.
+    """
     across = 1.0 - p.external_load_vertical_share * (1.0 - math.cos(angle))
     return (1.0 - p.external_load_piston_share) * across * load
 

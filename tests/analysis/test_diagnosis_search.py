@@ -277,6 +277,19 @@ def test_a_judge_recording_lacks_nothing_that_other_parameters_explain(
     assert (said in statement(off_there, judgement)) == reconciled
 
 
+def test_a_load_of_one_recording_may_not_be_another_s() -> None:
+    _, sheet, evidence = search({})
+    found = diagnose(evidence.experiments, sheet, lambda _: None)
+    loaded = trial(sheet, ("external_load",), found.refitted)
+    judgement = judged(replace(found, verdict="found", chosen=loaded), evidence.experiments)
+    assert judgement.surprising
+    assert not judgement.reconciled
+    said = statement(replace(found, verdict="found", chosen=loaded), judgement)
+    assert "a load from outside may have come at other times there" in said
+    unloaded = judged(replace(found, verdict="found"), evidence.experiments)
+    assert "a load from outside" not in statement(found, unloaded)
+
+
 def test_three_effects_are_found_together() -> None:
     hidden = {"effects.payload.mass": 200.0, "effects.command_delay.delay": 0.03}
     searched, _, evidence = search(hidden | SHIFT)

@@ -4,11 +4,12 @@ The registry knows these forms, so `found` with the name before the ~ is the rig
 """
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from emir_analysis.blind.hidden import Hidden, Random, between, either_sign
+from emir_analysis.blind.boom import GRAVITY
+from emir_analysis.blind.hidden import Hidden, Random, Scale, between, boom_mass, either_sign
 from emir_analysis.blind.machine import Array, Sizes
 from emir_analysis.blind.numbers import Numbers
 
@@ -133,6 +134,28 @@ class HangingLoad(Hidden):
         return super().weight(time, angle) - self.boom.tip * hung * math.cos(angle)
 
 
+class FillingHose(Hidden):
+    """Concrete that fills the hose along the boom: weight that comes while it works."""
+
+    name = "external_load~filling hose"
+    grows = ("concrete",)
+    scales: ClassVar[dict[str, Scale]] = {"concrete": boom_mass}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "concrete": between(random, 100.0, 400.0),
+            "filling_from": random.uniform(5.0, 15.0),
+            "filling_for": random.uniform(10.0, 25.0),
+        }
+
+    def weight(self, time: float, angle: float) -> Array:
+        s = self.sizes
+        share = min(max((time - s["filling_from"]) / s["filling_for"], 0.0), 1.0)
+        hose = GRAVITY * s["concrete"] * share * self.boom.tip * math.cos(angle)
+        return super().weight(time, angle) + hose
+
+
 class SlowLoad(Hidden):
     """A load that comes slowly and stays, or goes as it came."""
 
@@ -248,6 +271,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     AsymmetryAtInlet,
     LoadOnPiston,
     HangingLoad,
+    FillingHose,
     SlowLoad,
     SwingAboutMean,
     OtherOil,

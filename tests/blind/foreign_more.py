@@ -8,14 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from emir_analysis.blind.boom import GRAVITY
 from emir_analysis.blind.hidden import (
     HYDRAULIC,
     Hidden,
     Random,
     Scale,
     between,
-    boom_mass,
     either_sign,
     lifting_force,
     nominal_hose,
@@ -177,28 +175,6 @@ class LeaningBase(Hidden):
         return super().weight(time, angle + self.sizes["lean"])
 
 
-class FillingHose(Hidden):
-    """Concrete that fills the hose along the boom: weight that comes while it works."""
-
-    name = "filling_hose"
-    grows = ("concrete",)
-    scales: ClassVar[dict[str, Scale]] = {"concrete": boom_mass}
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {
-            "concrete": between(random, 100.0, 400.0),
-            "filling_from": random.uniform(5.0, 15.0),
-            "filling_for": random.uniform(10.0, 25.0),
-        }
-
-    def weight(self, time: float, angle: float) -> Array:
-        s = self.sizes
-        share = min(max((time - s["filling_from"]) / s["filling_for"], 0.0), 1.0)
-        hose = GRAVITY * s["concrete"] * share * self.boom.tip * math.cos(angle)
-        return super().weight(time, angle) + hose
-
-
 class ForgottenAccumulator(Hidden):
     """A gas bladder on the lifting line: soft above its precharge, not there below."""
 
@@ -256,7 +232,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     Crosstalk,
     CurvedTransducer,
     LeaningBase,
-    FillingHose,
     ForgottenAccumulator,
     ThinningOil,
 )

@@ -19,6 +19,7 @@ from emir_analysis.blind.plan import foreign_effects
 from emir_analysis.blind.recording import Run, Start, repeated
 from emir_common.parameter_tree import with_values
 from emir_plant.boom import boom_modes
+from emir_plant.parameters import GRAVITY
 from emir_plant.plant import Plant
 from emir_plant.sensors import readings
 from emir_plant.sheet import load_sheet
@@ -188,6 +189,10 @@ FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
     _OTHER["external_load~vertical"]: (
         {"hung_on": -1e3, "hung_at": 0.7, "swings_at": 0.4},
         {"force": -1e3, "frequency": 0.4, "start": 0.7, "vertical_share": 1.0},
+    ),
+    _OTHER["external_load~filling hose"]: (
+        {"concrete": 100.0, "filling_from": 0.7, "filling_for": 0.8},
+        {"force": -100.0 * GRAVITY, "start": 0.7, "rise": 0.8, "vertical_share": 1.0},
     ),
     _OTHER["external_load~slow"]: (
         {"pull": 1e3, "comes_at": 0.7, "comes_in": 0.8, "stays": 2.0},

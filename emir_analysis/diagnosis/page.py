@@ -61,12 +61,12 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
 
 def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
     rows = [
-        (effect.name, effect.balance, name, *p.told, p.unit, p.meaning)
+        (effect.name, effect.balance, name, p.told[0], p.interval, p.unit, p.meaning)
         for effect in effects
         for name, p in effect.parameters.items()
     ]
-    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit", "meaning")
-    caption = "low, high: two standard deviations from the curvature of the fit"
+    columns = ("effect", "balance", "parameter", "value", "interval", "unit", "meaning")
+    caption = "interval: two standard deviations either way from the curvature of the fit"
     return [Table(columns, rows, caption)] if rows else []
 
 
@@ -218,14 +218,14 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
     stated = {u.path: u for u in findings.refitted.unknowns.members}
 
     def row(path: str, p: ParameterResult) -> tuple[str | float, ...]:
-        about, (value, low, high) = stated[path], p.told
+        about = stated[path]
         return (
             path,
             p.unit,
             about.origin,
             "{:.3g} ... {:.3g}".format(*about.deviation(0.0, 1.0)),
-            value,
-            f"{low} ... {high}",
+            p.told[0],
+            p.interval,
             ", ".join(other.rsplit(".", 1)[1] for other in p.confounded_with),
         )
 

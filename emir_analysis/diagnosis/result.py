@@ -26,7 +26,7 @@ from emir_analysis.diagnosis.statistics import (
     whiteness,
 )
 from emir_analysis.diagnosis.swing import Swing
-from emir_analysis.diagnosis.telling import untold
+from emir_analysis.diagnosis.telling import open_shares, untold
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.signals import Array
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
 FEWEST_DIGITS = 3
+OPEN = "not determined by the recording"
+SET = "set: as good as fitted"
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of errors look back
 
@@ -48,7 +50,7 @@ class ParameterResult:
     """A fitted parameter; low, high: two standard deviations from the curvature of the fit.
 
     confounded_with: parameters whose fitted values go up or down with this one's. meaning: of an
-    effect's parameter, as its registry says.
+    effect's parameter, as its registry says. note: what to know of it in place of an interval.
     """
 
     value: float
@@ -57,6 +59,7 @@ class ParameterResult:
     high: float
     confounded_with: tuple[str, ...]
     meaning: str = ""
+    note: str = ""
 
     @property
     def told(self) -> tuple[str, str, str]:
@@ -68,12 +71,16 @@ class ParameterResult:
         value, low, high = (f"{x:.{digits}g}" for x in (self.value, self.low, self.high))
         return value, low, high
 
+    @property
+    def interval(self) -> str:
+        """Return the interval as it is shown, or what to know in its place."""
+        return self.note or "{1} ... {2}".format(*self.told)
+
 
 def parameter_line(name: str, p: ParameterResult, unit: str) -> str:
     """Return a parameter as a line for a terminal, in a unit as it is called there."""
-    value, low, high = p.told
     shown = "" if unit == "1" else f" {unit}"
-    return f"{name:40}{value:>11}{shown}  ({low} ... {high})  {p.meaning}"
+    return f"{name:40}{p.told[0]:>11}{shown}  ({p.interval})  {p.meaning}"
 
 
 @dataclass(frozen=True)
@@ -185,7 +192,9 @@ def diagnosis(
     return Diagnosis(
         verdict=verdict(findings, judged),
         statement=statement(findings, judged),
-        effects=effect_results(findings.chosen, fitted),
+        effects=effect_results(
+            findings.chosen, fitted, open_shares(findings.chosen, findings.evidence)
+        ),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
         tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
@@ -229,7 +238,8 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
         low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
         value = unknown.value(float(x))
         with_it = together[unknown.path]
-        result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
+        note = OPEN if unknown.is_open(float(x), WIDTH * float(spread[k])) else ""
+        result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it, "", note)
     return result
 
 
@@ -251,10 +261,12 @@ def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, 
     }
 
 
-def effect_results(chosen: Trial, fitted: dict[str, ParameterResult]) -> tuple[EffectResult, ...]:
+def effect_results(
+    chosen: Trial, fitted: dict[str, ParameterResult], undecided: frozenset[str] = frozenset()
+) -> tuple[EffectResult, ...]:
     """Return a trial's effects with their fitted parameters, and those that were fixed at the end.
 
-    fitted: by dotted path.
+    fitted: by dotted path. undecided: paths of shares that may as well be the other end.
     """
     found = []
     for name in chosen.effects:
@@ -267,8 +279,11 @@ def effect_results(chosen: Trial, fitted: dict[str, ParameterResult]) -> tuple[E
                 parameters[parameter] = replace(fitted[path], meaning=about.meaning)
             elif parameter not in kind.sizes or getattr(effect, parameter) != 0.0:
                 value = float(getattr(effect, parameter))
+                low, high, note = value, value, SET
+                if path in undecided:
+                    low, high, note = 0.0, 1.0, OPEN
                 parameters[parameter] = ParameterResult(
-                    value, about.unit, value, value, (), about.meaning
+                    value, about.unit, low, high, (), about.meaning, note
                 )
         found.append(EffectResult(name, kind.balance, parameters))
     return tuple(found)

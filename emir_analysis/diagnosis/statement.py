@@ -220,4 +220,9 @@ def tell_apart(findings: Findings) -> str | None:
         return None
     trials = [findings.chosen, *findings.rivals]
     best, apart = movement(trials, findings.evidence)
+    if apart < 1.0:
+        return (
+            f"no movement that is known tells them apart: in {best}, where they differ most, by"
+            f" {apart:.1f} times the noise"
+        )
     return f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise"

@@ -9,7 +9,10 @@ from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.select import STRONG, free_run_score
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
+from emir_plant.effects import REGISTRY
 
 # what only this balance shows: effects that can otherwise not be named, or not be told apart
 ONLY_HERE = {
@@ -54,6 +57,26 @@ def untold(evidence: Evidence) -> dict[str, str]:
             missing = " and ".join(sorted(BALANCES[name].signals - evidence.measured))
             lines[name] = f"without {missing} {ONLY_HERE[name]}"
     return lines
+
+
+def open_shares(chosen: Trial, evidence: Evidence) -> frozenset[str]:
+    """Return shares that were set to none or all of it where the other end is as good.
+
+    By dotted path. The other parameters are left as they are.
+    """
+    fitted = {unknown.path for unknown in chosen.unknowns.members}
+    score = free_run_score(chosen, evidence, seen=0.0)
+    found = set()
+    for path, (about, value) in declared(chosen.machine).items():
+        group, *names = path.split(".")
+        if group != "effects" or names[0] not in chosen.effects or path in fitted:
+            continue
+        is_share = about.unit == "1" and (about.low, about.high) == (0.0, 1.0)
+        if is_share and names[1] not in REGISTRY[names[0]].sizes:
+            other = free_run_score(chosen.fixed(path, 1.0 - value), evidence, seen=0.0)
+            if other < score + STRONG:
+                found.add(path)
+    return frozenset(found)
 
 
 def movement(rivals: Sequence[Trial], evidence: Evidence) -> tuple[str, float]:

@@ -55,6 +55,10 @@ class Unknown:
         """Return the values at x - width and x + width, inside the bounds."""
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
 
+    def is_open(self, x: float, width: float) -> bool:
+        """Tell whether all that an effect's parameter may be lies within a width of x."""
+        return not self.toleranced and x - width <= self.low and x + width >= self.high
+
     @property
     def is_share(self) -> bool:
         """Tell whether it is a share, of which none and all are as likely as any other."""

@@ -59,11 +59,12 @@ def write_page(
         ),
         Heading("Parameters"),
         Table(
-            ("parameter", "fitted", "low", "high", "unit", "confounded with"),
+            ("parameter", "fitted", "interval", "unit", "confounded with"),
             [
                 (
                     path,
-                    *p.told,
+                    p.told[0],
+                    p.interval,
                     p.unit.replace("time", result.time_unit),
                     ", ".join(p.confounded_with),
                 )
@@ -76,16 +77,17 @@ def write_page(
 
 
 def _effects(result: ActuatorDiagnosis) -> list[Block]:
+    unit = result.time_unit
     rows = [
-        (e.name, e.balance, name, *p.told, p.unit.replace("time", result.time_unit), p.meaning)
+        (e.name, e.balance, name, p.told[0], p.interval, p.unit.replace("time", unit), p.meaning)
         for e in result.effects
         for name, p in e.parameters.items()
     ]
     about = (
-        "low, high: two standard deviations from the curvature of the fit. Flows are in units of"
-        " the pressure rate that they make, velocities in units of flow."
+        "interval: two standard deviations either way from the curvature of the fit. Flows are in"
+        " units of the pressure rate that they make, velocities in units of flow."
     )
-    columns = ("effect", "balance", "parameter", "value", "low", "high", "unit", "meaning")
+    columns = ("effect", "balance", "parameter", "value", "interval", "unit", "meaning")
     return [Table(columns, rows, about)] if rows else []
 
 

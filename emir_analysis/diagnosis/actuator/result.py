@@ -12,6 +12,7 @@ from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, no
 from emir_analysis.diagnosis.actuator.search import Search
 from emir_analysis.diagnosis.actuator.verdict import BALANCE, statement, verdict
 from emir_analysis.diagnosis.result import (
+    OPEN,
     BalanceResult,
     EffectResult,
     ErrorTests,
@@ -243,7 +244,8 @@ def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:
         ends = [min(max(x + s * INTERVAL * deviation, unknown.low), unknown.high) for s in (-1, 1)]
         low, high = sorted(unknown.value(float(end)) for end in ends)
         value, with_it = unknown.value(float(x)), together[unknown.path]
-        found[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it)
+        note = OPEN if (unknown.low, unknown.high) == tuple(ends) else ""
+        found[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it, "", note)
     return found
 
 

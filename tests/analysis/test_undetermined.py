@@ -1,0 +1,48 @@
+"""What a recording does not determine is said to be so, in place of an interval."""
+
+import numpy as np
+import pytest
+from operated import moved
+
+from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.result import OPEN, SET, effect_results, parameter_line
+from emir_analysis.diagnosis.telling import open_shares
+from emir_analysis.diagnosis.unknowns import unknowns
+from emir_common.parameter_tree import with_values
+from emir_plant.sheet import Sheet, joint1
+
+LOAD = "effects.external_load."
+PUSH = {"force": -1200.0, "start": 2.0, "duration": 20.0, "piston_share": 1.0}
+
+
+def pushed() -> tuple[Trial, Evidence]:
+    """Return a load on the piston's rod with its shares set, and a recording of it."""
+    stated = joint1()
+    hidden = {LOAD + name: value for name, value in PUSH.items()}
+    evidence = Evidence([moved(with_values(stated, hidden))], stated)
+    begun = trial(Sheet(stated, {}, {}, ()), ("external_load",))
+    x = [
+        u.at(hidden.get(u.path, 0.0)) if not u.logarithmic else 0.0 for u in begun.unknowns.members
+    ]
+    known = begun.at(np.array(x))
+    return known.fixed(LOAD + "piston_share", 1.0).fixed(LOAD + "vertical_share", 0.0), evidence
+
+
+def test_a_share_that_nothing_depends_on_is_not_determined() -> None:
+    """On the rod no force is vertical, but that it is on the rod is told."""
+    known, evidence = pushed()
+    found = open_shares(known, evidence)
+    assert found == {LOAD + "vertical_share"}
+    (effect,) = effect_results(known, {}, found)
+    shown = {name: (p.low, p.high, p.note) for name, p in effect.parameters.items()}
+    assert shown["vertical_share"] == (0.0, 1.0, OPEN)
+    assert shown["piston_share"] == (1.0, 1.0, SET)
+    assert OPEN in parameter_line("vertical_share", effect.parameters["vertical_share"], "1")
+
+
+@pytest.mark.parametrize(("width", "is_open"), [(np.inf, True), (1.0, False)])
+def test_what_may_be_anything_is_not_determined(width: float, *, is_open: bool) -> None:
+    members = unknowns(Sheet(joint1(), {}, {}, ()), ("logic_block_fault",)).members
+    threshold = next(member for member in members if member.path.endswith("threshold"))
+    assert threshold.is_open(threshold.start, width) == is_open

@@ -63,7 +63,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     search = Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
-    final = search.whole.fitted(chosen) if chosen.effects else refitted
+    final = search.whole.plainer(search.whole.fitted(chosen)) if chosen.effects else refitted
     machines = [sheet.machine, search.balanced.machine]
     before, unaided = evidence.residuals(machines)
     after = unaided

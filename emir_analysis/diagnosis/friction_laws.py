@@ -9,6 +9,7 @@ from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
+NEAR = 2.0  # standard deviations
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 
 
@@ -60,7 +61,7 @@ def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
     if VISCOUS in full.effects:
         found.append(full.without(VISCOUS))
     if STRIBECK in full.effects:
-        found.append(_without_breakaway(full, sheet))
+        found.append(without_breakaway(full, sheet))
     return found
 
 
@@ -79,7 +80,16 @@ def viscous_is_heard(known: Trial, evidence: Evidence, floor: Array) -> bool:
     return known.machine.effects.viscous_friction.coefficient * fastest >= float(floor[FORCE])
 
 
-def _without_breakaway(full: Trial, sheet: Sheet) -> Trial:
+def breakaway_may_be_none(known: Trial) -> bool:
+    """Tell whether Stribeck's friction may be Coulomb's, by the curvature of a trial's fit."""
+    for unknown, x, spread in zip(known.unknowns.members, known.x, known.spread, strict=True):
+        if unknown.path == f"effects.{STRIBECK}.breakaway":
+            return bool(x - NEAR * spread <= unknown.low)
+    return False
+
+
+def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
+    """Return a trial with Coulomb's friction in place of Stribeck's, of the same size."""
     values, others = full.unknowns.values(full.x), full.without(STRIBECK)
     found = trial(sheet, (*others.effects, COULOMB), others)
     found = found.fixed(_share(COULOMB), full.machine.effects.stribeck_friction.gradual_share)

@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians, rms
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
@@ -26,7 +27,7 @@ from emir_analysis.diagnosis.statistics import (
     whiteness,
 )
 from emir_analysis.diagnosis.swing import Swing
-from emir_analysis.diagnosis.telling import open_shares, untold
+from emir_analysis.diagnosis.telling import between_steps, open_shares, untold
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.signals import Array
@@ -188,7 +189,7 @@ def diagnosis(
     period = judged.evidence.experiments[0].period
     stages = (*STAGES, BLACK_BOX)
     whole = {stage: np.concatenate(judged.errors(stage)) for stage in stages}
-    fitted = _parameters(findings.chosen)
+    fitted = _parameters(findings.chosen, findings.evidence)
     return Diagnosis(
         verdict=verdict(findings, judged),
         statement=statement(findings, judged),
@@ -228,7 +229,7 @@ def write_json(path: Path, result: "DataclassInstance") -> None:
     write_text(path, json.dumps(_plain(asdict(result)), indent=2) + "\n")
 
 
-def _parameters(trial: Trial) -> dict[str, ParameterResult]:
+def _parameters(trial: Trial, evidence: Evidence) -> dict[str, ParameterResult]:
     members = trial.unknowns.members
     spread = trial.spread
     together = confounded([member.path for member in members], trial.covariance)
@@ -238,7 +239,10 @@ def _parameters(trial: Trial) -> dict[str, ParameterResult]:
         low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
         value = unknown.value(float(x))
         with_it = together[unknown.path]
-        note = OPEN if unknown.is_open(float(x), WIDTH * float(spread[k])) else ""
+        if unknown.is_stepwise and not np.isfinite(spread[k]):
+            low, high = between_steps(trial, k, evidence)
+        anything = (low, high) == unknown.deviation(float(x), math.inf)
+        note = OPEN if anything and not unknown.toleranced else ""
         result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it, "", note)
     return result
 

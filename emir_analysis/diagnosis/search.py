@@ -300,7 +300,19 @@ class Search:
         """
         near = self._head.until(_astray(best.trial, self._head) + SHORTEST)
         found = screen_free_run(best.trial, self._sheet, near)
-        return [self._scored(s.trial) for s in found[:MOST_SIMULATED]]
+        return [self._scored(self._led(s.trial, best)) for s in found[:MOST_SIMULATED]]
+
+    def _led(self, begun: Trial, best: Tried) -> Trial:
+        """Return a trial as it was begun on the free run, or as the balances have it, if better.
+
+        To first order play that opens seldom is far too small: it explains nothing until the
+        piston crosses it at the right instants.
+        """
+        if not self._evidence.complete:
+            return begun
+        start = trial(self._sheet, begun.effects, best.trial)
+        balanced = fit_balances(start, self._head, self.floor)
+        return min(begun, balanced, key=lambda t: excess(t, self._head))
 
     def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
         """Fit trials to the balances, those that come close to the best of them to the free run.
@@ -351,7 +363,19 @@ class Search:
             simulated.append(self._simulated(tried))
         self.tried += simulated
         better = [t for t in simulated if _free(t) < _free(best) - STRONG]
-        return better or [t for t in simulated if self._suffices(t.trial, best.trial)]
+        better = better or [t for t in simulated if self._suffices(t.trial, best.trial)]
+        return better or self._late(simulated, best)
+
+    def _late(self, simulated: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial nearest to the whole recordings, fitted to them, if that suffices.
+
+        What acts in the part held back alone, as play that opens there, no fit has seen.
+        """
+        if not simulated or self._enough(best.trial):
+            return []
+        nearest = min(simulated, key=lambda t: self.whole.score(t.trial))
+        fitted = replace(nearest, trial=self.whole.fitted(nearest.trial))
+        return [fitted] if self._suffices(fitted.trial, best.trial) else []
 
     def _simulated(self, tried: Tried) -> Tried:
         """Return a trial fitted to the free run.

@@ -23,6 +23,8 @@ ONLY_HERE = {
     "bending": "the bending modes stay as stated, and a load is told from friction less well",
 }
 
+REACHES = np.geomspace(1e-2, 1e3, 16)  # in trial values
+TWO_DEVIATIONS = 4.0  # by how much a score is worse there
 REST = 1.0  # s
 PERIOD = 10e-3  # s, between the samples that are compared
 
@@ -77,6 +79,27 @@ def open_shares(chosen: Trial, evidence: Evidence) -> frozenset[str]:
             if other < score + STRONG:
                 found.add(path)
     return frozenset(found)
+
+
+def between_steps(chosen: Trial, k: int, evidence: Evidence) -> tuple[float, float]:
+    """Return the values of a trial's k-th parameter between which its free run stays as good.
+
+    For one that acts in steps, as a threshold does: slopes say nothing of it.
+    """
+    unknown, x = chosen.unknowns.members[k], float(chosen.x[k])
+    limit = free_run_score(chosen, evidence, seen=0.0) + TWO_DEVIATIONS
+
+    def end(way: float, farthest: float) -> float:
+        for reach in REACHES:
+            at = chosen.x.copy()
+            at[k] = x + way * reach
+            if reach >= farthest:
+                return x + way * farthest
+            if free_run_score(chosen.at(at), evidence, seen=0.0) > limit:
+                return float(at[k])
+        return x + way * farthest
+
+    return unknown.value(end(-1.0, x - unknown.low)), unknown.value(end(1.0, unknown.high - x))
 
 
 def movement(rivals: Sequence[Trial], evidence: Evidence) -> tuple[str, float]:

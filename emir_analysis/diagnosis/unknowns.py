@@ -55,15 +55,18 @@ class Unknown:
         """Return the values at x - width and x + width, inside the bounds."""
         return self.value(max(x - width, self.low)), self.value(min(x + width, self.high))
 
-    def is_open(self, x: float, width: float) -> bool:
-        """Tell whether all that an effect's parameter may be lies within a width of x."""
-        return not self.toleranced and x - width <= self.low and x + width >= self.high
-
     @property
     def is_share(self) -> bool:
         """Tell whether it is a share, of which none and all are as likely as any other."""
         low, high = self.value(self.low), self.value(self.high)
         return self.unit == "1" and abs(low) < END and abs(high - 1.0) < END
+
+    @property
+    def is_stepwise(self) -> bool:
+        """Tell whether it is an effect's parameter that acts in steps."""
+        group, *names = self.path.split(".")
+        known = group == "effects" and names[0] in REGISTRY
+        return known and names[1] in REGISTRY[names[0]].stepwise
 
     @property
     def shapes(self) -> bool:

@@ -6,11 +6,14 @@ from collections.abc import Callable
 from emir_analysis.diagnosis.candidates import HOPELESS, Trial, refine_free_run
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.friction_laws import (
+    STRIBECK,
     VISCOUS,
+    breakaway_may_be_none,
     gradual,
     is_gradual,
     sticks,
     viscous_is_heard,
+    without_breakaway,
 )
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import STRONG, at_noise, excess, free_run_score
@@ -125,6 +128,25 @@ class Whole:
         ways = [refine_free_run(still, self._evidence), lasting]
         score = self.score(fitted)
         return next((way for way in ways if self.score(way) <= score), fitted)
+
+    def plainer(self, fitted: Trial) -> Trial:
+        """Return a trial with one size of an effect alone where that explains the whole as well.
+
+        Or with Coulomb's friction in place of one whose break-away may be none. Two sizes together
+        may lead to where neither is right, such as a negative compliance.
+        """
+        fewer = []
+        if not sticks(fitted):
+            each = [fitted.with_each_size(effect) for effect in fitted.effects]
+            fewer = [min(alone, key=self.score) for alone in each if alone]
+        elif STRIBECK in fitted.effects and breakaway_may_be_none(fitted):
+            fewer = [without_breakaway(fitted, self._sheet)]
+        for less in fewer:
+            refitted = refine_free_run(less, self._evidence)
+            if self.score(refitted) <= self.score(fitted):
+                fitted = refitted
+        self.keep(fitted)
+        return fitted
 
     def keep(self, fitted: Trial) -> None:
         """Take a trial as the one that is fitted with its effects."""

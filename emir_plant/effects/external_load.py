@@ -38,15 +38,17 @@ class ExternalLoad(Effect):
         "vertical_share": 0.5,
     }
 
-    force: float = quantity("N", -1e5, 1e5, "F", default=0.0)
-    mean: float = quantity("N", -1e5, 1e5, "M", default=0.0)
+    force: float = quantity("N", -1e5, 1e5, "F, as at the TCP", default=0.0)
+    mean: float = quantity("N", -1e5, 1e5, "M, as at the TCP", default=0.0)
     frequency: float = quantity("Hz", 0.0, 20.0, "f; 0: constant while it acts", default=0.0)
     phase: float = quantity("rad", -6.3, 6.3, "at the start", default=0.0)
     start: float = quantity("s", -1e6, 1e6, "t_0, since the start of the run", default=0.0)
     rise: float = quantity("s", 0.0, 1e3, "from nothing to all of it, and back", default=0.0)
     duration: float = quantity("s", 1e-3, 1e6, "how long it acts", default=1e6)
     decay: float = quantity("1/s", 0.0, 10.0, "d, of the swing", default=0.0)
-    piston_share: float = quantity("1", 0.0, 1.0, "of it, on the piston's rod", default=0.0)
+    piston_share: float = quantity(
+        "1", 0.0, 1.0, "of it, on the rod, L / b times as large", default=0.0
+    )
     vertical_share: float = quantity(
         "1", 0.0, 1.0, "of the rest, vertical, not across the boom", default=0.0
     )

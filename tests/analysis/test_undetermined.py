@@ -7,8 +7,7 @@ from operated import moved
 from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.result import OPEN, SET, effect_results, parameter_line
-from emir_analysis.diagnosis.telling import open_shares
-from emir_analysis.diagnosis.unknowns import unknowns
+from emir_analysis.diagnosis.telling import between_steps, open_shares
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 
@@ -41,8 +40,17 @@ def test_a_share_that_nothing_depends_on_is_not_determined() -> None:
     assert OPEN in parameter_line("vertical_share", effect.parameters["vertical_share"], "1")
 
 
-@pytest.mark.parametrize(("width", "is_open"), [(np.inf, True), (1.0, False)])
-def test_what_may_be_anything_is_not_determined(width: float, *, is_open: bool) -> None:
-    members = unknowns(Sheet(joint1(), {}, {}, ()), ("logic_block_fault",)).members
-    threshold = next(member for member in members if member.path.endswith("threshold"))
-    assert threshold.is_open(threshold.start, width) == is_open
+@pytest.mark.parametrize(("pressure", "told"), [(60e5, True), (-60e5, False)])
+def test_a_threshold_is_told_where_it_is_crossed(pressure: float, *, told: bool) -> None:
+    """By which moves the logic block closes and by which it does not: slopes say nothing."""
+    path = "effects.logic_block_fault.threshold"
+    stated = joint1()
+    evidence = Evidence([moved(with_values(stated, {path: pressure}))], stated)
+    begun = trial(Sheet(stated, {}, {}, ()), ("logic_block_fault",))
+    known = begun.with_one_size("logic_block_fault", "threshold")
+    (threshold,) = known.unknowns.members
+    x = np.array([threshold.at(pressure)])
+    low, high = between_steps(known.at(x), 0, evidence)
+    assert low <= pressure <= high
+    assert (low > threshold.value(threshold.low)) == told
+    assert high < threshold.value(threshold.high)

@@ -6,11 +6,16 @@
     mass       dw/dt = omega^2 (p - friction(w) - load) - force of the swinging load
 
 p: pressure above that at rest, w: velocity as a flow, o: opening behind play, delay, offset and
-overlap. One unit of flow raises the pressure by one per unit of time. With an elastic arm the
-mass's velocity is another one, a, and the light piston's follows from p = friction(w) + load + f:
+overlap. One unit of flow raises the pressure by one per unit of time. With an elastic arm a share m
+of the mass is the piston's and the rest's velocity is another one, a:
 
     arm        f = (s beyond the play) / compliance + d (w - a),   ds/dt = w - a
-    mass       da/dt = omega^2 f - force of the swinging load
+    piston     dw/dt = omega^2 / m (p - friction(w) - load - f)
+    mass       da/dt = omega^2 / (1 - m) f - force of the swinging load
+
+A light piston, m below LIGHT, has the velocity that follows from p = friction(w) + load + f.
+
+The state has the time, too, and what the spool drags behind play, which is moved at a step's end.
 """
 
 from functools import cache
@@ -20,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_common.parameter_tree import declared
+from emir_plant.actuator.effects import LIGHT
 from emir_plant.actuator.parameters import Actuator
 from emir_plant.actuator.unnamed import PLACES, straight
 from emir_plant.effects.smooth_sign import smooth_sign
@@ -30,10 +36,13 @@ Array = NDArray[np.float64]
 STEPS = 2  # of the integration between two samples, at least
 SWITCHING = 8  # times as many where a load-holding valve may switch
 RESOLVED = 2.0  # of the fastest rate times a step; RK4 is stable up to 2.8
-STATES = 8
-SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY = range(STATES)
+STATES = 10
+SPOOL, PRESSURE, VELOCITY, WAY, ARM, ARM_WAY, SWING, SWING_WAY, EDGES, CLOCK = range(STATES)
 NOWHERE = 1e6  # a pressure that only a run out of all bounds has
-RELIEF = 5.0  # 1/time: flow of a relief valve per pressure above its setting
+CRITICAL = 0.02  # pressure below which a gap's root law becomes laminar
+USUAL = 3.0  # pressure that signals of the order of one hardly exceed
+APPROACHED = 3  # times, the speed of a light piston that sticks
+MOST_STEPS = 40  # what is stiffer than these resolve is not simulated: so is no machine
 LAMINAR = 0.02  # relative drop below which the orifice's square root is made smooth
 
 
@@ -100,25 +109,44 @@ def way(actuator: Actuator, command: Array, pressure: Array, period: float) -> A
 
 
 def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
-    """Return the flow and the state's derivative (8,) at a spool command."""
+    """Return the flow and the state's derivative (10,) at a spool command."""
     slope = np.zeros(STATES)
     flow = _slope(state, state[PRESSURE], opening, record(actuator)[0], slope)
     return Rates(flow, slope)
 
 
 @compiled_in_place
-def _flow(spool: float, pressure: float, p: Any) -> float:
+def _dragged(held: float, leading: float, play: float) -> float:
+    """Return where what leads with play drags what it holds."""
+    return min(max(held, leading - play), leading + play)
+
+
+@compiled_in_place
+def _play_ahead(p: Any) -> float:
+    """Return half the play between command and spool."""
+    return p.effects_valve_hysteresis_play * p.effects_valve_hysteresis_command_share
+
+
+@compiled_in_place
+def _edges(spool: float, held: float, p: Any) -> float:
+    """Return where the metering edges are that a spool drags."""
+    return _dragged(held, spool, p.effects_valve_hysteresis_play - _play_ahead(p))
+
+
+@compiled_in_place
+def _flow(edges: float, pressure: float, time: float, p: Any) -> float:
     """Return the flow that the valve gives, in the sense of rising pressure."""
+    gain = abs(p.valve_gain) * max(1.0 + p.effects_flow_gain_drift_rate * time, 0.0)
     sign = 1.0 if p.valve_gain > 0.0 else -1.0
-    opening = sign * (spool + p.effects_valve_null_offset_offset)
+    opening = sign * (edges + p.effects_valve_null_offset_offset)
     if opening > 0.0:
         metered = max(opening - p.effects_valve_dead_zone_error_lifting, 0.0)
-        flow = abs(p.valve_gain) * metered
+        flow = gain * metered
         if p.effects_flow_limit_lifting > 0.0:
             flow = min(flow, p.effects_flow_limit_lifting)
         return flow * _orifice(1.0 - p.effects_supply_pressure_droop_lifting * pressure)
     metered = max(-opening - p.effects_valve_dead_zone_error_lowering, 0.0)
-    flow = abs(p.valve_gain) * (1.0 + p.effects_valve_gain_asymmetry_lowering) * metered
+    flow = gain * (1.0 + p.effects_valve_gain_asymmetry_lowering) * metered
     if p.effects_flow_limit_lowering > 0.0:
         flow = min(flow, p.effects_flow_limit_lowering)
     return -flow * _orifice(1.0 + p.effects_supply_pressure_droop_lowering * pressure)
@@ -131,72 +159,6 @@ def _orifice(drop: float) -> float:
         return 1.0
     softened = np.sqrt(np.sqrt(drop * drop + LAMINAR * LAMINAR))
     return drop / softened * np.sqrt(np.sqrt(1.0 + LAMINAR * LAMINAR))
-
-
-@compiled_in_place
-def _friction(velocity: float, p: Any) -> float:
-    """Return what resists a velocity, as a pressure."""
-    resisting = p.load_viscous_friction * velocity
-    resisting += p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
-    if p.effects_coulomb_friction_force > 0.0:
-        number = velocity / p.effects_coulomb_friction_smoothing_speed
-        share = p.effects_coulomb_friction_gradual_share
-        resisting += p.effects_coulomb_friction_force * smooth_sign(number, share)
-    return resisting
-
-
-@compiled_in_place
-def _damper(p: Any) -> float:
-    """Return the elastic arm's damping, pressure per velocity."""
-    stiffness = 1.0 / p.effects_elastic_boom_compliance
-    return 2.0 * p.effects_elastic_boom_damping * np.sqrt(stiffness) / p.load_frequency
-
-
-@compiled_in_place
-def _spring_force(way: float, p: Any) -> float:
-    """Return the arm's force at a way of the piston against the mass, as a pressure."""
-    play = p.effects_elastic_boom_play
-    return (way - min(max(way, -play), play)) / p.effects_elastic_boom_compliance
-
-
-@compiled_in_place
-def _share(flow: float, p: Any) -> float:
-    """Return the share of the oil that is compressed beside the piston."""
-    return 1.0 if flow > 0.0 else 1.0 - p.effects_load_holding_valve_line
-
-
-@compiled_in_place
-def _switches(spool: float, command: float, p: Any) -> bool:
-    """Tell whether a load-holding valve may open or shut before the spool is at a command."""
-    if p.effects_load_holding_valve_line == 0.0:
-        return False
-    return (_flow(spool, 0.0, p) > 0.0) != (_flow(command, 0.0, p) > 0.0)
-
-
-@compiled_in_place
-def _steps(p: Any, period: float) -> int:
-    """Return the steps between two samples that resolve what is fastest on the oil."""
-    fastest = 0.0
-    if p.effects_elastic_boom_compliance > 0.0:
-        fastest = 1.0 / (p.load_viscous_friction + _damper(p))
-    elif p.effects_coulomb_friction_force > 0.0:
-        steepest = p.effects_coulomb_friction_force / p.effects_coulomb_friction_smoothing_speed
-        fastest = p.load_frequency * p.load_frequency * steepest
-    if p.effects_relief_valve_high > 0.0 or p.effects_relief_valve_low > 0.0:
-        fastest += RELIEF
-    fastest /= 1.0 - p.effects_load_holding_valve_line
-    return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
-
-
-@compiled_in_place
-def _light_piston(pressure: float, damper: float, p: Any) -> float:
-    """Return the velocity at which friction and the arm's damper resist with this pressure."""
-    moving = max(abs(pressure) - p.effects_coulomb_friction_force, 0.0)
-    linear = p.load_viscous_friction + damper
-    turbulent = p.effects_turbulent_resistance_coefficient
-    # the root of turbulent v^2 + linear v = moving, without cancellation
-    speed = 2.0 * moving / (linear + np.sqrt(linear * linear + 4.0 * turbulent * moving))
-    return speed if pressure > 0.0 else -speed
 
 
 @compiled_in_place
@@ -224,44 +186,206 @@ def _unnamed_force(way: float, p: Any) -> float:
 
 
 @compiled_in_place
-def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
-    """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
-    flow = _flow(x[SPOOL], pressure, p) + _unnamed_flow(x[SPOOL], p)
+def _stuck(velocity: float, p: Any) -> float:
+    """Return Stribeck's friction at a velocity, whatever its sign."""
+    if p.effects_stribeck_friction_breakaway == 0.0:
+        return p.effects_stribeck_friction_force
+    number = velocity / p.effects_stribeck_friction_velocity
+    return p.effects_stribeck_friction_force + p.effects_stribeck_friction_breakaway * np.exp(
+        -number * number
+    )
+
+
+@compiled_in_place
+def _pressed(pressure: float, p: Any) -> float:
+    """Return the friction of seals under a pressure, whatever its sign."""
+    loaded = pressure + p.effects_pressure_dependent_friction_rest
+    return p.effects_pressure_dependent_friction_coefficient * abs(loaded)
+
+
+@compiled_in_place
+def _dry(velocity: float, pressure: float, p: Any) -> float:
+    """Return the dry friction of a piston that moves."""
+    return p.effects_coulomb_friction_force + _stuck(velocity, p) + _pressed(pressure, p)
+
+
+@compiled_in_place
+def _friction(velocity: float, pressure: float, p: Any) -> float:
+    """Return what resists a velocity, as a pressure."""
+    resisting = p.load_viscous_friction * velocity
+    resisting += p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
+    if p.effects_coulomb_friction_force > 0.0:
+        number = velocity / p.effects_coulomb_friction_smoothing_speed
+        share = p.effects_coulomb_friction_gradual_share
+        resisting += p.effects_coulomb_friction_force * smooth_sign(number, share)
+    if _stuck(velocity, p) > 0.0:
+        number = velocity / p.effects_stribeck_friction_smoothing_speed
+        share = p.effects_stribeck_friction_gradual_share
+        resisting += _stuck(velocity, p) * smooth_sign(number, share)
+    if p.effects_pressure_dependent_friction_coefficient > 0.0:
+        number = velocity / p.effects_pressure_dependent_friction_smoothing_speed
+        share = p.effects_pressure_dependent_friction_gradual_share
+        resisting += _pressed(pressure, p) * smooth_sign(number, share)
+    return resisting
+
+
+@compiled_in_place
+def _steepest(p: Any) -> float:
+    """Return the most that dry friction grows with velocity, about standstill."""
+    steepest = p.effects_coulomb_friction_force / p.effects_coulomb_friction_smoothing_speed
+    steepest += _stuck(0.0, p) / p.effects_stribeck_friction_smoothing_speed
+    pressed = _pressed(USUAL, p)
+    return steepest + pressed / p.effects_pressure_dependent_friction_smoothing_speed
+
+
+@compiled_in_place
+def _leakage(pressure: float, p: Any) -> float:
+    """Return the flow that leaves the oil by no valve."""
+    leakage = p.effects_internal_leakage_conductance * pressure
+    if p.effects_internal_leakage_orifice > 0.0:
+        root = np.sqrt(np.sqrt(pressure * pressure + CRITICAL * CRITICAL))
+        leakage += p.effects_internal_leakage_orifice * pressure / root
     relief = 0.0
     if p.effects_relief_valve_high > 0.0:
-        relief += RELIEF * max(pressure - p.effects_relief_valve_high, 0.0)
+        relief += max(pressure - p.effects_relief_valve_high, 0.0)
     if p.effects_relief_valve_low > 0.0:
-        relief -= RELIEF * max(-pressure - p.effects_relief_valve_low, 0.0)
-    leakage = p.effects_internal_leakage_conductance * pressure + relief
-    leakage += _unnamed_leakage(pressure, p)
+        relief -= max(-pressure - p.effects_relief_valve_low, 0.0)
+    leakage += p.effects_relief_valve_conductance * relief
+    return leakage + _unnamed_leakage(pressure, p)
+
+
+@compiled_in_place
+def _damper(p: Any) -> float:
+    """Return the elastic arm's damping, pressure per velocity."""
+    stiffness = 1.0 / p.effects_elastic_boom_compliance
+    return 2.0 * p.effects_elastic_boom_damping * np.sqrt(stiffness) / p.load_frequency
+
+
+@compiled_in_place
+def _spring_force(way: float, p: Any) -> float:
+    """Return the arm's force at a way of the piston against the mass, as a pressure."""
+    play = p.effects_elastic_boom_play
+    return (way - min(max(way, -play), play)) / p.effects_elastic_boom_compliance
+
+
+@compiled_in_place
+def _share(flow: float, p: Any) -> float:
+    """Return the share of the oil that is compressed beside the piston."""
+    return 1.0 if flow > 0.0 else 1.0 - p.effects_load_holding_valve_line
+
+
+@compiled_in_place
+def _switches(x: Any, command: float, p: Any) -> bool:
+    """Tell whether a load-holding valve may open or shut before the spool is at a command."""
+    if p.effects_load_holding_valve_line == 0.0:
+        return False
+    now, then = _edges(x[SPOOL], x[EDGES], p), _edges(command, x[EDGES], p)
+    return (_flow(now, 0.0, 0.0, p) > 0.0) != (_flow(then, 0.0, 0.0, p) > 0.0)
+
+
+@compiled_in_place
+def _piston_rate(p: Any) -> float:
+    """Return how fast a piston with a share of the mass settles between oil and elastic arm."""
+    piston = p.load_frequency * p.load_frequency / p.effects_elastic_boom_piston_share
+    springs = np.sqrt(piston * (1.0 + 1.0 / p.effects_elastic_boom_compliance))
+    return max(springs, piston * (p.load_viscous_friction + _damper(p) + _steepest(p)))
+
+
+@compiled_in_place
+def _piston_is_light(p: Any) -> bool:
+    """Tell whether the piston beside an elastic arm has no mass."""
+    return p.effects_elastic_boom_piston_share < LIGHT
+
+
+@compiled_in_place
+def _steps(p: Any, period: float) -> int:
+    """Return the steps between two samples that resolve what is fastest on the oil."""
+    mass, steepest = p.load_frequency * p.load_frequency, _steepest(p)
+    if p.effects_elastic_boom_compliance == 0.0:
+        fastest = mass * steepest
+    elif _piston_is_light(p):
+        fastest = 1.0 / (p.load_viscous_friction + _damper(p))
+    else:
+        fastest = _piston_rate(p)
+    if p.effects_relief_valve_high > 0.0 or p.effects_relief_valve_low > 0.0:
+        fastest += p.effects_relief_valve_conductance
+    fastest += p.effects_internal_leakage_orifice / np.sqrt(CRITICAL)
+    fastest /= 1.0 - p.effects_load_holding_valve_line
+    return max(STEPS, int(np.ceil(fastest * period / RESOLVED)))
+
+
+@compiled_in_place
+def _light_piston(pressure: float, own: float, damper: float, p: Any) -> float:
+    """Return the velocity at which friction and the arm's damper resist with a pressure.
+
+    own: the oil's, on which friction may depend. What is larger near standstill is approached
+    from there.
+    """
+    speed = _speed(abs(pressure) - _dry(0.0, own, p), damper, p)
+    if p.effects_stribeck_friction_breakaway > 0.0:
+        for _ in range(APPROACHED):
+            speed = _speed(abs(pressure) - _dry(speed, own, p), damper, p)
+    return speed if pressure > 0.0 else -speed
+
+
+@compiled_in_place
+def _speed(left: float, damper: float, p: Any) -> float:
+    """Return the speed at which viscous and turbulent friction resist with what is left."""
+    moving = max(left, 0.0)
+    linear = p.load_viscous_friction + damper
+    turbulent = p.effects_turbulent_resistance_coefficient
+    # the root of turbulent v^2 + linear v = moving, without cancellation
+    return 2.0 * moving / (linear + np.sqrt(linear * linear + 4.0 * turbulent * moving))
+
+
+@compiled_in_place
+def _resistance(velocity: float, pressure: float, p: Any) -> float:
+    return _friction(velocity, pressure, p) + _unnamed_friction(velocity, p)
+
+
+@compiled_in_place
+def _slope(x: Any, pressure: float, command: float, p: Any, slope: Any) -> float:
+    """Write the state's derivative; return the flow. pressure: of the oil, in every term."""
+    edges = _edges(x[SPOOL], x[EDGES], p)
+    flow = _flow(edges, pressure, x[CLOCK], p) + _unnamed_flow(edges, p)
     mass = p.load_frequency * p.load_frequency
     load = p.effects_external_load_force + p.effects_external_load_gradient * x[WAY]
     load -= _unnamed_force(x[WAY], p)
     if p.effects_elastic_boom_compliance > 0.0:
-        damper = _damper(p)
+        damper, carrier = _damper(p), x[ARM]
         spring = _spring_force(x[ARM_WAY], p)
-        velocity = _light_piston(pressure - load - spring + damper * x[ARM], damper, p)
-        carrier = x[ARM]
-        slope[VELOCITY] = 0.0
-        slope[ARM] = mass * (spring + damper * (velocity - carrier))
+        if _piston_is_light(p):
+            share = 0.0
+            pushed = pressure - load - spring + damper * carrier
+            velocity = _light_piston(pushed, pressure, damper, p)
+            slope[VELOCITY] = 0.0
+        else:
+            share = p.effects_elastic_boom_piston_share
+            velocity = x[VELOCITY]
+            bending = spring + damper * (velocity - carrier)
+            left = pressure - load - _resistance(velocity, pressure, p) - bending
+            slope[VELOCITY] = mass / share * left
+        slope[ARM] = mass / (1.0 - share) * (spring + damper * (velocity - carrier))
         slope[ARM_WAY] = velocity - carrier
     else:
         velocity = x[VELOCITY]
         carrier = velocity
-        resisting = _friction(velocity, p) + _unnamed_friction(velocity, p)
-        slope[VELOCITY] = mass * (pressure - load - resisting)
+        slope[VELOCITY] = mass * (pressure - load - _resistance(velocity, pressure, p))
         slope[ARM] = 0.0
         slope[ARM_WAY] = 0.0
     swing = p.effects_swinging_load_frequency
-    tug = swing * swing * x[SWING_WAY]
-    tug += 2.0 * p.effects_swinging_load_damping * swing * (carrier - x[SWING])
+    pull = swing * swing * x[SWING_WAY]
+    drag = 2.0 * p.effects_swinging_load_damping * swing * (carrier - x[SWING])
     moved = ARM if p.effects_elastic_boom_compliance > 0.0 else VELOCITY
-    slope[moved] -= p.effects_swinging_load_mass_ratio * tug
+    felt = pull + (1.0 - p.effects_swinging_load_air_share) * drag
+    slope[moved] -= p.effects_swinging_load_mass_ratio * felt
     slope[SPOOL] = (command - x[SPOOL]) / p.valve_time_constant
-    slope[PRESSURE] = (flow - velocity - leakage) / _share(flow, p)
+    slope[PRESSURE] = (flow - velocity - _leakage(pressure, p)) / _share(flow, p)
     slope[WAY] = velocity
-    slope[SWING] = tug
+    slope[SWING] = pull + drag
     slope[SWING_WAY] = carrier - x[SWING]
+    slope[EDGES] = 0.0
+    slope[CLOCK] = 1.0
     return flow
 
 
@@ -277,23 +401,18 @@ def _at(values: Any, time: float) -> float:
 
 
 @compiled_in_place
-def _loss(flow: float, coefficient: float) -> float:
-    """Return the turbulent loss of a line."""
-    return coefficient * flow * abs(flow)
-
-
-@compiled_in_place
-def _dragged(held: float, command: float, play: float) -> float:
-    """Return where a command with play drags what it holds."""
-    return min(max(held, command - play), command + play)
+def _loss(flow: float, p: Any) -> float:
+    """Return the loss of a line."""
+    turbulent = p.effects_line_resistance_coefficient * flow * abs(flow)
+    return turbulent + p.effects_line_resistance_laminar * flow
 
 
 @compiled_in_place
 def _oil(x: Any, measured: Any, time: float, p: Any) -> float:
     """Return the oil's pressure behind the line, of the measured one."""
     pressure = _at(measured, time)
-    loss = _loss(_flow(x[SPOOL], pressure, p), p.effects_line_resistance_coefficient)
-    return pressure - loss
+    edges = _edges(x[SPOOL], x[EDGES], p)
+    return pressure - _loss(_flow(edges, pressure, x[CLOCK], p), p)
 
 
 @compiled_in_place
@@ -316,19 +435,25 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
     free = measured.size == 0
     usual = _steps(p, period)
     lag = p.effects_command_delay_delay / period
-    play = p.effects_valve_hysteresis_play
-    line = p.effects_line_resistance_coefficient
+    if usual > MOST_STEPS:
+        shown[:] = NOWHERE
+        return
+    play = _play_ahead(p)
     held = command[0]
     x[SPOOL] = held
+    x[EDGES] = held
     x[PRESSURE] = start
+    creeping = _flow(held, start, 0.0, p) - _leakage(start, p)
+    creeping *= p.effects_valve_null_offset_creeping
+    x[VELOCITY], x[ARM], x[SWING] = creeping, creeping, creeping
     for k in range(command.size):
         now = x[PRESSURE] if free else measured[k]
-        seen = _loss(_flow(x[SPOOL], now, p), line)
+        seen = _loss(_flow(x[EDGES], now, x[CLOCK], p), p)
         shown[k, 0] = x[PRESSURE] + seen
         shown[k, 1] = x[PRESSURE] + seen
         shown[k, 2] = x[WAY]
         steps = usual
-        if _switches(x[SPOOL], _dragged(held, _at(command, k + 1 - lag), play), p):
+        if _switches(x, _dragged(held, _at(command, k + 1 - lag), play), p):
             steps *= SWITCHING
         h = period / steps
         for j in range(steps):
@@ -345,6 +470,7 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
             _slope(y, y[PRESSURE] if free else _oil(y, measured, end, p), held, p, d)
             for i in range(STATES):
                 x[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
+            x[EDGES] = _edges(x[SPOOL], x[EDGES], p)
         if not abs(x[PRESSURE]) < NOWHERE:
             for later in range(k + 1, command.size):
                 shown[later, 0] = shown[later, 1] = shown[later, 2] = NOWHERE

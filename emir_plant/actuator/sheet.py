@@ -93,6 +93,9 @@ def _sheet(content: dict[Any, Any]) -> ActuatorSheet:
             raise ParameterError(f"{path}: missing")
     values = {path: _value(entry["value"], path) for path, entry in entries.items()}
     ranges = {p: _range(e["range"], p, values[p]) for p, e in entries.items() if "range" in e}
+    for path, ends in ranges.items():
+        for end in ends:
+            known[path][0].check(f"{path}, its range", end)
     return ActuatorSheet(with_values(_BLANK, values), ranges, time_unit)
 
 
@@ -128,7 +131,9 @@ def _range(limits: Any, path: str, value: Any) -> tuple[float, float]:
     if not isinstance(limits, list) or len(limits) != 2:  # noqa: PLR2004 - low and high
         raise ParameterError(f"{path}: range = {limits!r}: not a list of lowest and highest value")
     low, high = (_number(limit, path) for limit in limits)
-    if not low <= value <= high or low == high:
+    if low >= high:
+        raise ParameterError(f"{path}: range = [{low:g}, {high:g}]: the lowest value comes first")
+    if not low <= value <= high:
         raise ParameterError(f"{path} = {value:g}: outside its range {low:g} ... {high:g}")
     return low, high
 

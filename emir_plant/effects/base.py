@@ -19,6 +19,7 @@ class Effect:
     trial: values at which a search for a missing effect starts in EMIR's main joint, SI units.
     stepwise: names of the sizes that act only beyond some value, and too much soon after: a search
         goes through them in steps of their trial values.
+    none_or_above: values of fields below which they count as none.
     """
 
     balance: ClassVar[Balance]
@@ -26,6 +27,7 @@ class Effect:
     source: ClassVar[str]
     trial: ClassVar[dict[str, float]]
     stepwise: ClassVar[tuple[str, ...]] = ()
+    none_or_above: ClassVar[dict[str, float]] = {}
 
     @property
     def is_on(self) -> bool:

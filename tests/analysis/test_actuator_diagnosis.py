@@ -233,6 +233,8 @@ def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -
         (lambda u, p: (0.0 * u, p), "valve_opening is constant"),
         (lambda u, p: (u, 0.0 * p + 3.0), "oil_pressure is constant"),
         (lambda u, p: (u[:50], p[:50]), "record at least 200"),
+        (lambda u, p: (u, 200.0 * p), "data sheet's values with it, by 100"),
+        (lambda u, p: (100.0 * u, p), "valve_opening is of the size"),
     ],
 )
 def test_a_recording_of_no_use_is_told(

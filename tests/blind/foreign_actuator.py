@@ -5,7 +5,7 @@ Each is a subclass of the actuator's `Hidden` with sizes at random; `FOREIGN` li
 
 import math
 
-from emir_analysis.blind.actuator.hidden import Hidden, dry, root
+from emir_analysis.blind.actuator.hidden import Hidden, dry
 from emir_analysis.blind.hidden import Random, between
 from emir_analysis.blind.machine import Sizes
 
@@ -56,10 +56,12 @@ class TightSpot(Hidden):
             "tight_width": random.uniform(1.0, 4.0),
         }
 
-    def resistance(self, velocity: float, way: float) -> float:
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
         s = self.sizes
         near = math.exp(-0.5 * ((way - s["tight_place"]) / s["tight_width"]) ** 2)
-        return super().resistance(velocity, way) + s["tight_friction"] * near * dry(velocity)
+        return super().resistance(velocity, way, pressure) + s["tight_friction"] * near * dry(
+            velocity
+        )
 
 
 class Wind(Hidden):
@@ -85,21 +87,8 @@ class OneWayDrag(Hidden):
     def draw(cls, random: Random) -> Sizes:
         return {"drag": between(random, 0.5, 2.0)}
 
-    def resistance(self, velocity: float, way: float) -> float:
-        return super().resistance(velocity, way) + self.sizes["drag"] * max(velocity, 0.0)
-
-
-class TurbulentLeak(Hidden):
-    """A leak through a hole, not a gap: with the root of the pressure."""
-
-    name = "turbulent_leak"
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"hole": between(random, 0.03, 0.2)}
-
-    def leaving(self, pressure: float) -> float:
-        return super().leaving(pressure) + self.sizes["hole"] * root(pressure)
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
+        return super().resistance(velocity, way, pressure) + self.sizes["drag"] * max(velocity, 0.0)
 
 
 class SoftOil(Hidden):
@@ -154,7 +143,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     TightSpot,
     Wind,
     OneWayDrag,
-    TurbulentLeak,
     SoftOil,
     EndCushion,
     ClippedTransducer,

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from emir_analysis.blind.actuator.hidden import Hidden, dry
+from emir_analysis.blind.actuator.hidden import Hidden
 from emir_analysis.blind.actuator.machine import SPOOL, State
 from emir_analysis.blind.hidden import Random, between, either_sign
 from emir_analysis.blind.machine import Array, Sizes
@@ -15,26 +15,6 @@ from emir_analysis.blind.machine import Array, Sizes
 RAMP = 3.0  # samples, in which a load comes on the hook or leaves it
 VOID = 50.0  # how much softer oil is that boils
 BOILING = 0.02  # pressure over which it begins to
-
-
-class StribeckFriction(Hidden):
-    """Seals that stick: dry friction that falls with speed."""
-
-    name = "stribeck_friction"
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {
-            "sticking": between(random, 0.2, 0.8),
-            "kept_sliding": random.uniform(0.0, 0.3),
-            "stribeck_speed": between(random, 0.08, 0.3),
-        }
-
-    def resistance(self, velocity: float, way: float) -> float:
-        s = self.sizes
-        slow = math.exp(-((velocity / s["stribeck_speed"]) ** 2))
-        share = s["kept_sliding"] + (1.0 - s["kept_sliding"]) * slow
-        return super().resistance(velocity, way) + s["sticking"] * share * dry(velocity)
 
 
 class PickedUpLoad(Hidden):
@@ -195,7 +175,6 @@ class CoarseCommand(Hidden):
 
 
 FOREIGN: tuple[type[Hidden], ...] = (
-    StribeckFriction,
     PickedUpLoad,
     ChatteringValve,
     WarmingOil,

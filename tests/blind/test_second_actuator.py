@@ -58,6 +58,21 @@ SAME: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"dry_friction": 0.3},
         {"force": 0.3, "smoothing_speed": 0.02, "gradual_share": 1.0},
     ),
+    hidden.StribeckFriction: (
+        {"sticking": 0.5, "kept_sliding": 0.4, "stribeck_speed": 0.2},
+        {
+            "force": 0.2,
+            "breakaway": 0.3,
+            "velocity": 0.2,
+            "smoothing_speed": 0.02,
+            "gradual_share": 1.0,
+        },
+    ),
+    hidden.PressureDependentFriction: (
+        {"seal_coefficient": 0.2, "seal_rest": 1.5},
+        {"coefficient": 0.2, "rest": 1.5, "smoothing_speed": 0.02, "gradual_share": 1.0},
+    ),
+    hidden.FlowGainDrift: ({"drift": 5e-4}, {"rate": 5e-4}),
     hidden.TurbulentResistance: ({"turbulent": 0.5}, {"coefficient": 0.5}),
     hidden.ExternalLoad: (
         {"weight": -0.3, "weight_per_way": 0.005},

@@ -72,6 +72,72 @@ def test_free_run_agrees_with_an_independent_solver() -> None:
     np.testing.assert_allclose(simulate(machine, OPENING, 1.0), expected, atol=0.02)
 
 
+def test_play_behind_the_spool_agrees_with_an_independent_solver() -> None:
+    """The spool does not know what it drags: its way, then the edges', then the oil's pressure."""
+    machine = _with("valve_hysteresis", play=0.1, command_share=0.0)
+    fine = np.linspace(0.0, 299.0, 299 * 50 + 1)
+
+    def follow(t: float, x: np.ndarray) -> np.ndarray:
+        return (np.interp(t, TIME, OPENING) - x) / 2.0
+
+    spool = solve_ivp(follow, (0, 299), [0.0], t_eval=fine, max_step=0.25, rtol=1e-8).y[0]
+    edges, held = np.empty_like(spool), 0.0
+    for k, leading in enumerate(spool):
+        held = min(max(held, leading - 0.1), leading + 0.1)
+        edges[k] = held
+
+    def slope(t: float, x: np.ndarray) -> list[float]:
+        return [1.5 * np.interp(t, fine, edges) - x[1], 0.3**2 * (x[0] - 0.4 * x[1])]
+
+    oil = solve_ivp(slope, (0, 299), [0.0, 0.0], t_eval=TIME, max_step=0.25, rtol=1e-8).y[0]
+    np.testing.assert_allclose(simulate(machine, OPENING, 1.0), oil, atol=0.01)
+
+
+def test_a_piston_with_mass_and_a_swing_that_air_damps_agree_with_an_independent_solver() -> None:
+    machine = with_values(PLAIN, {
+        "effects.elastic_boom.compliance": 1.5, "effects.elastic_boom.damping": 0.1,
+        "effects.elastic_boom.piston_share": 0.3, "effects.swinging_load.mass_ratio": 0.8,
+        "effects.swinging_load.frequency": 0.2, "effects.swinging_load.damping": 0.1,
+        "effects.swinging_load.air_share": 1.0,
+    })  # fmt: skip
+    damper = 2.0 * 0.1 / (0.3 * np.sqrt(1.5))
+
+    def slope(t: float, x: np.ndarray) -> list[float]:
+        spool, oil, piston, arm, spring, swing, swing_way = x
+        bent = spring / 1.5 + damper * (piston - arm)
+        pull = 0.2**2 * swing_way
+        return [
+            (np.interp(t, TIME, OPENING) - spool) / 2.0,
+            1.5 * spool - piston,
+            0.3**2 / 0.3 * (oil - 0.4 * piston - bent),
+            0.3**2 / 0.7 * bent - 0.8 * pull,
+            piston - arm,
+            pull + 2.0 * 0.1 * 0.2 * (arm - swing),
+            arm - swing,
+        ]
+
+    run = solve_ivp(slope, (0, 299), np.zeros(7), t_eval=TIME, max_step=0.25, rtol=1e-8)
+    np.testing.assert_allclose(simulate(machine, OPENING, 1.0), run.y[1], atol=0.01)
+
+
+def test_a_piston_that_creeps_from_the_start_goes_on_to() -> None:
+    """Pressure and velocity are those of steady motion, which nothing disturbs."""
+    machine = _with("valve_null_offset", offset=0.1, creeping=1.0)
+    steady = 0.4 * 1.5 * 0.1
+    np.testing.assert_allclose(simulate(machine, 0.0 * TIME, 1.0, steady), steady, rtol=1e-9)
+    still = with_values(machine, {"effects.valve_null_offset.creeping": 0.0})
+    assert np.ptp(simulate(still, 0.0 * TIME, 1.0, steady)) > 0.5 * steady
+
+
+def test_dry_friction_that_falls_with_speed_holds_a_light_piston_until_it_breaks_away() -> None:
+    stick = {"force": 0.2, "breakaway": 0.3, "velocity": 0.1}
+    values = {f"effects.stribeck_friction.{name}": value for name, value in stick.items()}
+    values["effects.elastic_boom.compliance"] = 1.0
+    for force, moves in ((0.49, False), (0.51, True)):
+        machine = with_values(PLAIN, values | {"effects.external_load.force": force})
+        assert (np.abs(simulate(machine, 0.0 * TIME, 1.0)).max() > 0.0) == moves
+
+
 def test_the_measured_pressure_of_its_own_machine_leaves_nothing_missing() -> None:
     machine = _with("flow_limit", lifting=0.6, lowering=0.8)
     pressure = simulate(machine, OPENING, 1.0)
@@ -173,6 +239,8 @@ def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
         ("valve: {gain: much, time_constant: 1.0}\nload: {frequency: 1.0}", "not a number"),
         ("valve: {gain: 1.0, time_constant: 0.0}\nload: {frequency: 1.0}", "outside"),
         ("valve: {volume: 1.0}", "valve.volume: there is no such parameter"),
+        (f"{WHOLE}\nsensor: {{pressure_noise: {{value: 1, range: [0, 20]}}}}", "its range"),
+        (f"{WHOLE}\nsensor: {{pressure_noise: {{value: 1, range: [2, 1]}}}}", "comes first"),
         ("effects: {magic: {size: 1.0}}", "effects.magic: there is no such effect"),
         ("time_unit: hours", "time_unit"),
         (f"{WHOLE}\neffects: {{unnamed_flow: {{points: [1.0]}}}}", "not a list of 7 numbers"),

@@ -243,9 +243,69 @@ class CoulombFriction(Hidden):
         """Draw the friction over the piston's area."""
         return {"dry_friction": between(random, 0.08, 0.5)}
 
-    def resistance(self, velocity: float, way: float) -> float:
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
         """Add the friction."""
-        return super().resistance(velocity, way) + self.sizes["dry_friction"] * dry(velocity)
+        return super().resistance(velocity, way, pressure) + self.sizes["dry_friction"] * dry(
+            velocity
+        )
+
+
+class StribeckFriction(Hidden):
+    """Seals that stick: dry friction that falls with speed."""
+
+    name = "stribeck_friction"
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        """Draw what sticks over the piston's area, the share kept when it slides and the speed."""
+        return {
+            "sticking": between(random, 0.2, 0.8),
+            "kept_sliding": random.uniform(0.0, 0.6),
+            "stribeck_speed": between(random, 0.08, 0.3),
+        }
+
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
+        """Add the friction."""
+        s = self.sizes
+        slow = math.exp(-((velocity / s["stribeck_speed"]) ** 2))
+        share = s["kept_sliding"] + (1.0 - s["kept_sliding"]) * slow
+        own = s["sticking"] * share * dry(velocity)
+        return super().resistance(velocity, way, pressure) + own
+
+
+class PressureDependentFriction(Hidden):
+    """Seals that the oil presses on."""
+
+    name = "pressure_dependent_friction"
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        """Draw the coefficient, and the pressure at rest, beside which the shown one counts."""
+        return {
+            "seal_coefficient": between(random, 0.05, 0.3),
+            "seal_rest": random.uniform(0.5, 3.0),
+        }
+
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
+        """Add the friction."""
+        s = self.sizes
+        own = s["seal_coefficient"] * abs(pressure + s["seal_rest"]) * dry(velocity)
+        return super().resistance(velocity, way, pressure) + own
+
+
+class FlowGainDrift(Hidden):
+    """Oil that warms up: the valve gives more and more, or less and less."""
+
+    name = "flow_gain_drift"
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        """Draw how much in a sample."""
+        return {"drift": either_sign(random, 2e-4, 6e-4)}
+
+    def gain(self, time: float, *, lifting: bool) -> float:
+        """Scale with time."""
+        return super().gain(time, lifting=lifting) * (1.0 + self.sizes["drift"] * time)
 
 
 class TurbulentResistance(Hidden):
@@ -258,10 +318,10 @@ class TurbulentResistance(Hidden):
         """Draw the loss per square of velocity."""
         return {"turbulent": between(random, 0.1, 1.0)}
 
-    def resistance(self, velocity: float, way: float) -> float:
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
         """Add the loss."""
         lost = self.sizes["turbulent"] * velocity * abs(velocity)
-        return super().resistance(velocity, way) + lost
+        return super().resistance(velocity, way, pressure) + lost
 
 
 class ExternalLoad(Hidden):
@@ -302,7 +362,7 @@ class ElasticBoom(Hidden):
         driving = x[OIL] - self.load(x[WAY], time) - self._spring(x) + damper * x[MASS]
 
         def left(velocity: float) -> float:
-            return driving - damper * velocity - self.resistance(velocity, x[WAY])
+            return driving - damper * velocity - self.resistance(velocity, x[WAY], x[OIL])
 
         fastest = driving / damper  # without friction
         return float(brentq(left, 0.0, fastest)) if fastest else 0.0
@@ -350,6 +410,7 @@ CATALOGUE: tuple[type[Hidden], ...] = (
     ValveDeadZoneError,
     ValveGainAsymmetry,
     ValveHysteresis,
+    FlowGainDrift,
     FlowLimit,
     SupplyPressureDroop,
     ReliefValve,
@@ -357,6 +418,8 @@ CATALOGUE: tuple[type[Hidden], ...] = (
     InternalLeakage,
     LineResistance,
     CoulombFriction,
+    StribeckFriction,
+    PressureDependentFriction,
     TurbulentResistance,
     ExternalLoad,
     ElasticBoom,

@@ -89,8 +89,8 @@ class Actuator:
         """Return the volume per pressure that the oil takes up, over the stated one."""
         return 1.0
 
-    def resistance(self, velocity: float, way: float) -> float:
-        """Return what resists the piston's motion, as a pressure."""
+    def resistance(self, velocity: float, way: float, pressure: float) -> float:
+        """Return what resists the piston's motion under the oil's pressure, as a pressure."""
         return self.n.friction * velocity
 
     def load(self, way: float, time: float) -> float:
@@ -103,7 +103,7 @@ class Actuator:
 
     def push(self, x: State, velocity: float, time: float) -> float:
         """Return the force on the mass, as a pressure, at the piston's velocity."""
-        return x[OIL] - self.resistance(velocity, x[WAY]) - self.load(x[WAY], time)
+        return x[OIL] - self.resistance(velocity, x[WAY], x[OIL]) - self.load(x[WAY], time)
 
     def hanging(self) -> float:
         """Return the hanging load's mass over that of what carries it."""

@@ -102,10 +102,33 @@ def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...
         kind = KNOWN[effect]
         for name, trial in kind.trial.items():
             about = quantities(kind)[name]
+            low = kind.none_or_above.get(name, about.low)
             for place in [f".{k}" for k in range(about.count)] or [""]:
                 path = f"effects.{effect}.{name}{place}"
-                found.append(_unknown(path, about.unit, trial, about.low, about.high))
+                found.append(_unknown(path, about.unit, trial, low, about.high))
     return tuple(found)
+
+
+def _ways(members: tuple[Unknown, ...]) -> list[tuple[Unknown, ...]]:
+    """Return what is fitted, with and without what is either none or above some value."""
+    certain = tuple(member for member in members if not _may_be_none(member.path))
+    return [members] if len(certain) == len(members) else [certain, members]
+
+
+def _is_without(members: tuple[Unknown, ...], machine: Actuator) -> bool:
+    """Tell whether a machine has an effect, but none of what in it may be none."""
+    stated = flat_record(machine)
+    return any(
+        getattr(machine.effects, member.path.split(".")[1]).is_on
+        and column(stated, member.path)[0] == 0.0
+        for member in members
+        if _may_be_none(member.path)
+    )
+
+
+def _may_be_none(path: str) -> bool:
+    group, effect, *name = path.split(".")
+    return group == "effects" and name[0] in KNOWN[effect].none_or_above
 
 
 class _Surplus:
@@ -228,17 +251,22 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     `drawn` of places drawn from what is expected. The best ENDED after some steps are gone on from
     to the end, `thorough` all.
     """
+    begun = []
     members = unknowns(sheet, effects)
-    surplus = _Surplus(sheet, members, record, noise, seen)
-    starts = [] if known else [surplus.expected]
-    for machine in known:
-        starts += _starts(sheet, members, machine) if levels else [_place(members, machine)]
-    if drawn:
-        starts += surplus.drawn(surplus.guessed)[:drawn]
-    begun = [surplus.least(x, surplus.guessed, SHORT) for x in starts]
-    begun.sort(key=lambda found: float(found.cost))
+    ways = _ways(members)
+    for way in ways:
+        surplus = _Surplus(sheet, way, record, noise, seen)
+        starts = [] if known else [surplus.expected]
+        for machine in known:
+            if way is members and not thorough and _is_without(members, machine):
+                continue
+            starts += _starts(sheet, way, machine) if levels else [_place(way, machine)]
+        if drawn and (way is ways[0] or not known):
+            starts += surplus.drawn(surplus.guessed)[:drawn]
+        begun += [(surplus, surplus.least(x, surplus.guessed, SHORT)) for x in starts]
+    begun.sort(key=lambda each: float(each[1].cost))
     ended = begun if thorough else begun[:ENDED]
-    fits = [_ended(sheet, effects, surplus, found.x) for found in ended]
+    fits = [_ended(sheet, effects, surplus, found.x) for surplus, found in ended]
     return max(fits, key=lambda fitted: fitted.evidence)
 
 

@@ -1,5 +1,6 @@
 """A recording of an actuator as its diagnosis uses it: opening and pressure on one time grid."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
 LARGEST_GAP = 1.5  # sampling periods
 AT_REST = 8  # samples from which on a machine may be seen to rest
 STEADY = 2.0  # times the noise: the most that a pressure at rest varies
+NOT_OF_ORDER_ONE = 50.0
 SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
 
 
@@ -85,7 +87,7 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
             f"{path}: {max(count, 0)} samples that both signals share; record at least {FEWEST}"
         )
     time = begin + period * np.arange(count)
-    return ActuatorRecord(
+    record = ActuatorRecord(
         str(path),
         recording.start_ns * 1e-9 + begin,
         period,
@@ -93,6 +95,19 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
         np.interp(time, pressure.time, pressure.value),
         pressure.unit,
     )
+    _check_scale(path, OPENING, float(np.abs(record.opening).max()))
+    _check_scale(path, PRESSURE, float(np.std(record.pressure)))
+    return record
+
+
+def _check_scale(path: Path, name: str, size: float) -> None:
+    """Raise InputError where a signal is not scaled as the effects' sizes are."""
+    if not 1.0 / NOT_OF_ORDER_ONE <= size <= NOT_OF_ORDER_ONE:
+        raise InputError(
+            f"{path}: {name} is of the size {size:.3g}; effects are looked for in signals of the"
+            " order of one: divide it, and the data sheet's values with it, by"
+            f" {10.0 ** round(math.log10(size)):g}"
+        )
 
 
 def noise_of(pressure: Array) -> float:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numba
@@ -77,6 +78,7 @@ def search(
         lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN, thorough=True),
     )
     tried |= {_key(f): f for f in again}
+    _settle_below(sheet, record, noise, tried)
     ordered = _first(tried.values(), len(tried))
     plain = tried[frozenset()]
     chosen, rivals = _choice(ordered)
@@ -86,6 +88,28 @@ def search(
     progress("parts left out")
     unseen = {f.name: unseen_error(sheet, f.effects, record, noise) for f in shown}
     return Search(plain, chosen, tuple(ordered), tuple(rivals), unseen)
+
+
+def _settle_below(
+    sheet: ActuatorSheet,
+    record: ActuatorRecord,
+    noise: float,
+    tried: dict[frozenset[str], Fitted],
+) -> None:
+    """Fit the chosen set's own with one effect less once more from its machine, if that is better.
+
+    On the way up one of them may have been left in a poor minimum, which an effect that is not
+    there led out of. Goes on as long as another set is chosen.
+    """
+    before: frozenset[str] | None = None
+    while (chosen := _choice(_first(tried.values(), len(tried)))[0]) and _key(chosen) != before:
+        before = _key(chosen)
+        smaller = [tuple(e for e in chosen.effects if e != name) for name in chosen.effects]
+        begun = partial(fit, sheet, record=record, noise=noise, known=[chosen.machine])
+        for fitted in each(smaller, begun):
+            known = tried.get(_key(fitted))
+            if known is None or fitted.evidence > known.evidence:
+                tried[_key(fitted)] = fitted
 
 
 def _choice(ordered: list[Fitted]) -> tuple[Fitted, list[Fitted]]:

@@ -19,6 +19,10 @@ from emir_plant.actuator.unnamed import (
 from emir_plant.effects.base import Balance, Effect
 
 LIGHT = 0.05  # share of the mass on a piston, below which it counts as none
+# A piston with a share s of the mass beside an elastic arm and a mass that carries (1 - s) / s
+# times itself on a rope are the same equations: which of both it is goes by the sizes.
+MOST_ON_PISTON = 0.4
+MOST_HANGING = 1.5  # (1 - s) / s
 OF_ORDER_ONE = "signals are scaled to the order of one, and so is what makes them"
 
 
@@ -279,14 +283,16 @@ class ElasticBoom(Effect):
         "compliance": 1.0,
         "damping": 0.1,
         "play": 0.1,
-        "piston_share": 0.3,
+        "piston_share": 0.2,
     }
     none_or_above: ClassVar[dict[str, float]] = {"piston_share": LIGHT}
 
     compliance: float = quantity("1", 0.0, 20.0, "of the arm over that of the oil", default=0.0)
     damping: float = quantity("1", 0.02, 0.5, "of critical, of mass and arm", default=0.1)
     play: float = quantity("pressure", 0.0, 5.0, "half, as the oil that fills it", default=0.0)
-    piston_share: float = quantity("1", 0.0, 0.9, "of the mass, on the piston", default=0.0)
+    piston_share: float = quantity(
+        "1", 0.0, MOST_ON_PISTON, "of the mass, on the piston", default=0.0
+    )
 
 
 @dataclass(frozen=True)
@@ -303,7 +309,7 @@ class SwingingLoad(Effect):
         "air_share": 0.5,
     }
 
-    mass_ratio: float = quantity("1", 0.0, 5.0, "load over what carries it", default=0.0)
+    mass_ratio: float = quantity("1", 0.0, MOST_HANGING, "load over what carries it", default=0.0)
     frequency: float = quantity("rad/time", 0.01, 20.0, "of the pendulum", default=0.2)
     damping: float = quantity("1", 1e-4, 0.3, "of critical", default=0.005)
     air_share: float = quantity("1", 0.0, 1.0, "of the damping, by air", default=0.0)

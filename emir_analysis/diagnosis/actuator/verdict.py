@@ -47,7 +47,8 @@ def statement(word: str, found: Search, noise: float, curve: CurveResult | None)
     if word == "ambiguous":
         rivals = " or ".join(_instead(rival, found.chosen) for rival in found.rivals)
         names += f" ({rivals} would do as well: this recording cannot tell)"
-    return f"{names}; {left}"
+    rest = "" if found.chosen.rms <= AT_NOISE * noise else ": they do much, and something is left"
+    return f"{names}; {left}{rest}"
 
 
 def _instead(rival: Fitted, chosen: Fitted) -> str:

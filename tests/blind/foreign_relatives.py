@@ -24,43 +24,7 @@ from emir_analysis.blind.hidden import (
 from emir_analysis.blind.machine import Array, Machine, Sizes
 from emir_analysis.blind.numbers import Numbers
 
-LAMINAR = 1e5  # Pa, below which a hole is laminar
 STIFFENED = 6e6  # Pa, at which a hose gives way half as much
-
-
-def _through_a_hole(size: float, drop: float) -> float:
-    return size * drop / math.sqrt(math.hypot(drop, LAMINAR))
-
-
-class TurbulentLeak(Hidden):
-    """A scratch past the piston: flow with the root of the pressure."""
-
-    name = "internal_leakage~turbulent"
-    grows = ("scratch",)
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"scratch": between(random, 4e-9, 3e-8)}
-
-    def leaving(self, p_h: float, p_s: float) -> tuple[float, float]:
-        out_h, out_s = super().leaving(p_h, p_s)
-        across = _through_a_hole(self.sizes["scratch"], p_h - p_s)
-        return out_h + across, out_s - across
-
-
-class TurbulentDrip(Hidden):
-    """The same from the lifting chamber to the tank."""
-
-    name = "external_leakage~turbulent"
-    grows = ("drip",)
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"drip": between(random, 4e-9, 3e-8)}
-
-    def leaving(self, p_h: float, p_s: float) -> tuple[float, float]:
-        out_h, out_s = super().leaving(p_h, p_s)
-        return out_h + _through_a_hole(self.sizes["drip"], p_h - self.n.pT), out_s
 
 
 class SmoothHysteresis(Hidden):
@@ -292,8 +256,6 @@ class StraightFriction(Hidden):
 
 
 FOREIGN: tuple[type[Hidden], ...] = (
-    TurbulentLeak,
-    TurbulentDrip,
     SmoothHysteresis,
     SquareDroop,
     UnevenFriction,

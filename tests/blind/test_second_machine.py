@@ -163,6 +163,14 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
 _OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text(), hidden.Hidden)
 _OTHER = {kind.name: kind for kind in _OTHERS}
 FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
+    _OTHER["internal_leakage~turbulent"]: (  # 1e-11 (100 bar)^0.5
+        {"scratch": 1e-11 * 1e7**0.5},
+        {"coefficient": 1e-11, "turbulent_share": 1.0},
+    ),
+    _OTHER["external_leakage~turbulent"]: (
+        {"drip": 1e-11 * 1e7**0.5},
+        {"lifting": 1e-11, "turbulent_share": 1.0},
+    ),
     _OTHER["sensor_delay~dead time"]: (
         {"late_pressure_lifting": 0.037},
         {"pressure_lifting": 0.037, "dead_share": 1.0},

@@ -369,11 +369,13 @@ class Search:
     def _late(self, simulated: list[Tried], best: Tried) -> list[Tried]:
         """Return the trial nearest to the whole recordings, fitted to them, if that suffices.
 
-        What acts in the part held back alone, as play that opens there, no fit has seen.
+        What acts in the part held back alone, as play that opens there, no fit has seen. One that
+        is no nearer than the best so far is not fitted: that takes long.
         """
-        if not simulated or self._enough(best.trial):
+        limit = self.whole.score(best.trial) - STRONG
+        nearest = min(simulated, key=lambda t: self.whole.score(t.trial), default=None)
+        if nearest is None or self.whole.score(nearest.trial) >= limit:
             return []
-        nearest = min(simulated, key=lambda t: self.whole.score(t.trial))
         fitted = replace(nearest, trial=self.whole.fitted(nearest.trial))
         return [fitted] if self._suffices(fitted.trial, best.trial) else []
 

@@ -15,7 +15,7 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
 
 H, S = 1, 2  # columns of the outputs
-HOLE = 5e-8  # m^3/s over the root of Pa, from the lifting chamber to the tank
+WIDENED = 5e-19  # m^3/(s Pa^2), 5e-5 m^3/s at 100 bar
 AT = np.linspace(0.3, 0.7, POINTS)
 SPRING = 3e4 * np.sin(20.0 * AT)  # N, a lifting force by the stroke
 
@@ -107,17 +107,17 @@ def test_a_force_by_the_stroke_is_measured_beside_an_effect() -> None:
 
 
 def test_a_curve_takes_the_place_of_an_effect_that_only_comes_near() -> None:
-    """A hole, whose flow goes with the root of the pressure, in place of a gap's."""
+    """A gap that the pressure widens: its flow goes with the pressure's square."""
     at = np.linspace(0.0, 2e7, POINTS)
-    values = {"over": 1, "first": at[0], "last": at[-1], "lifting": (HOLE * np.sqrt(at)).tolist()}
-    hole = with_values(joint1(), {f"unnamed_leakage.{name}": v for name, v in values.items()})
-    shape = curve_of(instead(hole, "external_leakage"))
+    values = {"over": 1, "first": at[0], "last": at[-1], "lifting": (WIDENED * at**2).tolist()}
+    gap = with_values(joint1(), {f"unnamed_leakage.{name}": v for name, v in values.items()})
+    shape = curve_of(instead(gap, "external_leakage"))
     assert (shape.name, shape.over, shape.parts.keys()) == (
         "unnamed_leakage", "own_pressure", {"lifting"},
     )  # fmt: skip
     pressure = np.array(shape.signal)
     often = (pressure > 9e6) & (pressure < 1.3e7)
-    law = HOLE * np.sqrt(pressure[often])
+    law = WIDENED * pressure[often] ** 2
     assert np.array(shape.parts["lifting"])[often] == pytest.approx(law, rel=0.05)
 
 

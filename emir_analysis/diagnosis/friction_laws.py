@@ -9,8 +9,8 @@ from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
-NEAR = 2.0  # standard deviations
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
+NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 
 def sticks(known: Trial) -> bool:

@@ -11,7 +11,7 @@ from emir_analysis.diagnosis.proportions import proportion
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
-from emir_plant.effects import REGISTRY
+from emir_plant.effects import REGISTRY, Effect
 from emir_plant.parameters import Machine, groups
 from emir_plant.sheet import Sheet
 
@@ -62,18 +62,21 @@ class Unknown:
         return self.unit == "1" and abs(low) < END and abs(high - 1.0) < END
 
     @property
-    def is_stepwise(self) -> bool:
-        """Tell whether it is an effect's parameter that acts in steps."""
+    def _field(self) -> tuple[type[Effect], str] | None:
+        """The effect of the registry whose field it is, and the field's name; a curve has none."""
         group, *names = self.path.split(".")
         known = group == "effects" and names[0] in REGISTRY
-        return known and names[1] in REGISTRY[names[0]].stepwise
+        return (REGISTRY[names[0]], names[1]) if known else None
+
+    @property
+    def is_stepwise(self) -> bool:
+        """Tell whether it is an effect's parameter that acts in steps."""
+        return self._field is not None and self._field[1] in self._field[0].stepwise
 
     @property
     def shapes(self) -> bool:
         """Tell whether it shapes an effect, as an onset or a time constant does: is no size."""
-        group, *names = self.path.split(".")
-        known = group == "effects" and names[0] in REGISTRY  # a curve that has no name is not
-        return known and names[1] not in REGISTRY[names[0]].sizes
+        return self._field is not None and self._field[1] not in self._field[0].sizes
 
     def at_end(self, x: float) -> bool:
         """Tell whether x was led to the end of what is allowed.

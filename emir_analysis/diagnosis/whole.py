@@ -6,7 +6,6 @@ from collections.abc import Callable
 from emir_analysis.diagnosis.candidates import HOPELESS, Trial, refine_free_run
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.friction_laws import (
-    STRIBECK,
     VISCOUS,
     breakaway_may_be_none,
     gradual,
@@ -135,16 +134,11 @@ class Whole:
         Or with Coulomb's friction in place of one whose break-away may be none. Two sizes together
         may lead to where neither is right, such as a negative compliance.
         """
-        fewer = []
         if not sticks(fitted):
-            each = [fitted.with_each_size(effect) for effect in fitted.effects]
-            fewer = [min(alone, key=self.score) for alone in each if alone]
-        elif STRIBECK in fitted.effects and breakaway_may_be_none(fitted):
-            fewer = [without_breakaway(fitted, self._sheet)]
-        for less in fewer:
-            refitted = refine_free_run(less, self._evidence)
-            if self.score(refitted) <= self.score(fitted):
-                fitted = refitted
+            fitted = self._with_fewer_sizes(fitted)
+        elif breakaway_may_be_none(fitted):
+            smooth = refine_free_run(without_breakaway(fitted, self._sheet), self._evidence)
+            fitted = min(smooth, fitted, key=self.score)
         self.keep(fitted)
         return fitted
 

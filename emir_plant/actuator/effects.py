@@ -80,7 +80,7 @@ class ValveGainAsymmetry(Effect):
 
 @dataclass(frozen=True)
 class ValveHysteresis(Effect):
-    """Play between command and spool or, where command_share is 0, of spool and metering edges."""
+    """Play ahead of the spool, towards the command, or behind it, towards the metering edges."""
 
     balance: ClassVar[Balance] = "valve"
     sizes: ClassVar[tuple[str, ...]] = ("play",)
@@ -161,7 +161,7 @@ class LoadHoldingValve(Effect):
 
 @dataclass(frozen=True)
 class InternalLeakage(Effect):
-    """Oil leaks past the piston, in proportion to the pressure or through a gap like an orifice."""
+    """Oil leaks past the piston, in proportion to the pressure or, turbulent, to its root."""
 
     balance: ClassVar[Balance] = "chambers"
     sizes: ClassVar[tuple[str, ...]] = ("conductance", "orifice")

@@ -153,12 +153,17 @@ def _flow(edges: float, pressure: float, time: float, p: Any) -> float:
 
 
 @compiled_in_place
+def _softened_root(drop: float, laminar: float) -> float:
+    """Return the root of a pressure drop, made smooth below a laminar one."""
+    return np.sqrt(np.sqrt(drop * drop + laminar * laminar))
+
+
+@compiled_in_place
 def _orifice(drop: float) -> float:
     """Return the flow's share at a relative pressure drop; 1 at a drop of 1."""
     if drop == 1.0:
         return 1.0
-    softened = np.sqrt(np.sqrt(drop * drop + LAMINAR * LAMINAR))
-    return drop / softened * np.sqrt(np.sqrt(1.0 + LAMINAR * LAMINAR))
+    return drop / _softened_root(drop, LAMINAR) * _softened_root(1.0, LAMINAR)
 
 
 @compiled_in_place
@@ -210,22 +215,31 @@ def _dry(velocity: float, pressure: float, p: Any) -> float:
 
 
 @compiled_in_place
+def _directed(size: float, number: float, gradual_share: float) -> float:
+    """Return dry friction of a size against the motion, at a velocity over v_0."""
+    return size * smooth_sign(number, gradual_share) if size > 0.0 else 0.0
+
+
+@compiled_in_place
 def _friction(velocity: float, pressure: float, p: Any) -> float:
     """Return what resists a velocity, as a pressure."""
     resisting = p.load_viscous_friction * velocity
     resisting += p.effects_turbulent_resistance_coefficient * velocity * abs(velocity)
-    if p.effects_coulomb_friction_force > 0.0:
-        number = velocity / p.effects_coulomb_friction_smoothing_speed
-        share = p.effects_coulomb_friction_gradual_share
-        resisting += p.effects_coulomb_friction_force * smooth_sign(number, share)
-    if _stuck(velocity, p) > 0.0:
-        number = velocity / p.effects_stribeck_friction_smoothing_speed
-        share = p.effects_stribeck_friction_gradual_share
-        resisting += _stuck(velocity, p) * smooth_sign(number, share)
-    if p.effects_pressure_dependent_friction_coefficient > 0.0:
-        number = velocity / p.effects_pressure_dependent_friction_smoothing_speed
-        share = p.effects_pressure_dependent_friction_gradual_share
-        resisting += _pressed(pressure, p) * smooth_sign(number, share)
+    resisting += _directed(
+        p.effects_coulomb_friction_force,
+        velocity / p.effects_coulomb_friction_smoothing_speed,
+        p.effects_coulomb_friction_gradual_share,
+    )
+    resisting += _directed(
+        _stuck(velocity, p),
+        velocity / p.effects_stribeck_friction_smoothing_speed,
+        p.effects_stribeck_friction_gradual_share,
+    )
+    resisting += _directed(
+        _pressed(pressure, p),
+        velocity / p.effects_pressure_dependent_friction_smoothing_speed,
+        p.effects_pressure_dependent_friction_gradual_share,
+    )
     return resisting
 
 
@@ -243,7 +257,7 @@ def _leakage(pressure: float, p: Any) -> float:
     """Return the flow that leaves the oil by no valve."""
     leakage = p.effects_internal_leakage_conductance * pressure
     if p.effects_internal_leakage_orifice > 0.0:
-        root = np.sqrt(np.sqrt(pressure * pressure + CRITICAL * CRITICAL))
+        root = _softened_root(pressure, CRITICAL)
         leakage += p.effects_internal_leakage_orifice * pressure / root
     relief = 0.0
     if p.effects_relief_valve_high > 0.0:

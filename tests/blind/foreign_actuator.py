@@ -59,9 +59,8 @@ class TightSpot(Hidden):
     def resistance(self, velocity: float, way: float, pressure: float) -> float:
         s = self.sizes
         near = math.exp(-0.5 * ((way - s["tight_place"]) / s["tight_width"]) ** 2)
-        return super().resistance(velocity, way, pressure) + s["tight_friction"] * near * dry(
-            velocity
-        )
+        own = s["tight_friction"] * near * dry(velocity)
+        return super().resistance(velocity, way, pressure) + own
 
 
 class Wind(Hidden):

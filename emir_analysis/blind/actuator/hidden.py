@@ -245,9 +245,8 @@ class CoulombFriction(Hidden):
 
     def resistance(self, velocity: float, way: float, pressure: float) -> float:
         """Add the friction."""
-        return super().resistance(velocity, way, pressure) + self.sizes["dry_friction"] * dry(
-            velocity
-        )
+        own = self.sizes["dry_friction"] * dry(velocity)
+        return super().resistance(velocity, way, pressure) + own
 
 
 class StribeckFriction(Hidden):

@@ -250,6 +250,9 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     values, or with `levels` at all LEVELS of them; without any what is expected; and the best
     `drawn` of places drawn from what is expected. The best ENDED after some steps are gone on from
     to the end, `thorough` all.
+
+    What in an effect is none or above some value is fitted both ways. With it fits begin where the
+    effect is new or has it, `thorough` from every machine; places are drawn without it.
     """
     begun = []
     members = unknowns(sheet, effects)

@@ -14,7 +14,7 @@ FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
 LARGEST_GAP = 1.5  # sampling periods
 AT_REST = 8  # samples from which on a machine may be seen to rest
 STEADY = 2.0  # times the noise: the most that a pressure at rest varies
-NOT_OF_ORDER_ONE = 50.0
+NOT_OF_ORDER_ONE = 50.0  # times one, or less by as much: effects have other sizes then
 SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
 
 

@@ -42,6 +42,7 @@ MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 SETTLING = 2.0  # of play and oil in a step; Runge-Kutta 4 is unstable above 2.8
+CROSSING = 2e-4  # s, step while play and oil settle too fast to be followed: a flank is met in one
 FASTEST = 0.3  # m/s, of a piston: more than a valve (EMIR: Q_n / A_H = 55 mm/s) and a swing make
 FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging
 
@@ -79,6 +80,21 @@ class _Motion(NamedTuple):
     offset_rate: float  # of the piston against the joint, m/s
 
 
+class _Play(NamedTuple):
+    """The piston's play over a step: crossed at one rate all over it, if that is held."""
+
+    rate: float  # of the piston against the joint, m/s
+    held: bool
+
+
+class _Allowed(NamedTuple):
+    """How long a step may be."""
+
+    left: float  # s, at most
+    usual: float  # s, without dry friction
+    crossing: bool  # play and oil settle too fast for it
+
+
 @compiled_in_place
 def _motion(x: Array, p: Any) -> _Motion:
     n = p.mode_joint.size
@@ -100,6 +116,21 @@ def _motion(x: Array, p: Any) -> _Motion:
         joint_velocity,
         force,
         offset_rate,
+    )
+
+
+@compiled_in_place
+def _crossing(motion: _Motion, rate: float) -> _Motion:
+    """Return the motion with the play crossed at a rate, m/s."""
+    return _Motion(
+        motion.angle,
+        motion.tip_angle,
+        motion.arm,
+        motion.stroke,
+        motion.joint_velocity + rate,
+        motion.joint_velocity,
+        motion.force,
+        rate,
     )
 
 
@@ -257,14 +288,16 @@ def _advance(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle t
 ) -> None:
     """Advance x in place. work: (5, n), zeros at first, kept from call to call."""
     p = parameters[0]
-    steps = max(1, math.ceil(dt / min(step, _settling_step(x, dt, p)) - 1e-9))
+    settling = _settling_step(x, dt, p)
+    crossing = settling < min(CROSSING, step)
+    steps = max(1, math.ceil(dt / min(step, max(settling, CROSSING)) - 1e-9))
     h = dt / steps
     for _ in range(steps):
         arriving = command_delay.arriving(x[DELAY_LINE:MODES], command, x[TIME], h, p)
         x[PLAYED] = valve_hysteresis.played(arriving, x[PLAYED], p)
         left = h
         while left > 0.0:
-            left -= _step(x, x[PLAYED], left, h, p, work)
+            left -= _step(x, x[PLAYED], _Allowed(left, h, crossing), p, work)
 
 
 @compiled_in_place
@@ -276,34 +309,40 @@ def _settling_step(x: Array, dt: float, p: Any) -> float:
     if p.backlash_gap == 0.0:
         return math.inf
     motion = _motion(x, p)
-    stroke = motion.stroke
-    volume = chambers.volume_lifting(stroke, p)
-    oil = terms.stiffness_lifting(x[P_H], volume, p)
-    stiffness = oil * p.area_lifting**2 / volume
-    volume = chambers.volume_lowering(stroke, p)
-    oil = terms.stiffness_lowering(x[P_S], volume, p)
-    stiffness += oil * p.area_lowering**2 / volume
+    lifting, lowering = _pressure_by_stroke(x, motion.stroke, p)
+    stiffness = lifting * p.area_lifting + lowering * p.area_lowering
     nearest = max(abs(motion.force) - stiffness * FASTEST * dt, 0.0)
     return SETTLING / backlash.settling_rate(stiffness, nearest, p)
 
 
 @compiled_in_place
-def _step(  # noqa: PLR0913, PLR0917 (as _advance)
-    x: Array, command: float, left: float, usual: float, p: Any, work: Array
-) -> float:
-    """Advance x in place by one step of Runge-Kutta 4; return the step, s.
+def _pressure_by_stroke(x: Array, stroke: float, p: Any) -> tuple[float, float]:
+    """Return by how much p_H falls and p_S rises with the piston's stroke, m, in shut chambers.
 
-    left: the most it may be, s. usual: step without dry friction, s.
+    In Pa/m.
     """
+    volume = chambers.volume_lifting(stroke, p)
+    lifting = terms.stiffness_lifting(x[P_H], volume, p) * p.area_lifting / volume
+    volume = chambers.volume_lowering(stroke, p)
+    lowering = terms.stiffness_lowering(x[P_S], volume, p) * p.area_lowering / volume
+    return lifting, lowering
+
+
+@compiled_in_place
+def _step(x: Array, command: float, allowed: _Allowed, p: Any, work: Array) -> float:
+    """Advance x in place by one step of Runge-Kutta 4; return the step, s."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
-    dry = _write_first_rates(x, command, left, usual, p, k1)
+    dry = _write_first_rates(x, command, allowed, p, k1)
     h = dry.step
+    play = _Play(0.0, False)
+    if allowed.crossing:
+        play = _cross(x, h, p, k1)
     write_sum(x, 0.5 * h, k1, p, between)
-    _write_later_rates(between, command, dry, p, k2)
+    _write_later_rates(between, command, dry, play, p, k2)
     write_sum(x, 0.5 * h, k2, p, between)
-    _write_later_rates(between, command, dry, p, k3)
+    _write_later_rates(between, command, dry, play, p, k3)
     write_sum(x, h, k3, p, between)
-    _write_later_rates(between, command, dry, p, k4)
+    _write_later_rates(between, command, dry, play, p, k4)
     advance_by(x, h, work, p)
     x[P_H] = max(x[P_H], 0.0)
     x[P_S] = max(x[P_S], 0.0)
@@ -340,12 +379,31 @@ def advance_by(x: Array, h: float, stages: Array, p: Any) -> None:
 
 
 @compiled_in_place
-def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
-    x: Array, command: float, left: float, usual: float, p: Any, dx: Array
+def _cross(x: Array, h: float, p: Any, dx: Array) -> _Play:
+    """Return how the play is crossed over a step, h s, and put that into its first rates.
+
+    dx: those, with the offset as it stands.
+    """
+    stroke = _motion(x, p).stroke
+    lifting, lowering = _pressure_by_stroke(x, stroke, p)
+    stiffness = lifting * p.area_lifting + lowering * p.area_lowering
+    ahead = chambers.piston_force(x[P_H] + h * dx[P_H], x[P_S] + h * dx[P_S], p)
+    rate = backlash.rate_over(h, x[OFFSET], ahead, stiffness, p)
+    dx[P_H] -= lifting * rate
+    dx[P_S] += lowering * rate
+    dx[OFFSET] = rate
+    return _Play(rate, True)
+
+
+@compiled_in_place
+def _write_first_rates(
+    x: Array, command: float, allowed: _Allowed, p: Any, dx: Array
 ) -> dry_friction.Friction:
-    """Write dx/dt at the start of a step; return its dry friction. left, usual: as for `_step`."""
-    n = p.mode_joint.size
+    """Write dx/dt at the start of a step, but for play that is crossed; return its dry friction."""
+    n, left, usual = p.mode_joint.size, allowed.left, allowed.usual
     motion = _motion(x, p)
+    if allowed.crossing:
+        motion = _crossing(motion, 0.0)
     _write_rates(x, command, motion, 0.0, p, dx)
     if not terms.has_dry_friction(p):
         return dry_friction.Friction(left, 0.0, False)
@@ -384,11 +442,13 @@ def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
 
 
 @compiled_in_place
-def _write_later_rates(
-    x: Array, command: float, dry: dry_friction.Friction, p: Any, dx: Array
+def _write_later_rates(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, dry: dry_friction.Friction, play: _Play, p: Any, dx: Array
 ) -> None:
-    """Write dx/dt at a later stage of a step under its dry friction."""
+    """Write dx/dt at a later stage of a step under its dry friction and with its play."""
     motion = _motion(x, p)
+    if play.held:
+        motion = _crossing(motion, play.rate)
     force = dry.force
     if not dry.held:
         force = terms.dry_friction(motion.joint_velocity, _situation(motion), p)

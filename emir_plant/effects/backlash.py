@@ -1,4 +1,9 @@
-"""Play between piston and joint: the piston crosses it when the force changes sign."""
+"""Play between piston and joint: the piston crosses it when the force changes sign.
+
+While the piston crosses, next to no force is on it, and force and play settle within microseconds,
+whatever the boom does. Over a step that is too long to follow that the rate is the one at which
+the step ends (implicit Euler for this one rate), as for dry friction that sticks.
+"""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -7,6 +12,9 @@ from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
 from emir_plant.effects.smooth_sign import slope, smooth_sign
 from emir_plant.jit import compiled
+
+ITERATIONS = 60  # of the search for a rate, far more than it takes
+ACCURACY = 1e-9  # relative, of the rate
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,38 @@ def settling_rate(stiffness: float, force: float, p: Any) -> float:
 
     stiffness: of the oil against the piston's motion, N/m.
     """
+    return (1.0 + yielding(force, p) * stiffness) / p.backlash_crossing_time
+
+
+@compiled
+def yielding(force: float, p: Any) -> float:
+    """Return the slope of `flank` over the force, m/N."""
     steep = slope(force / p.backlash_seating_force, p.backlash_gradual_share)
-    steep = steep / p.backlash_seating_force + 1.0 / p.backlash_pin_force
-    yielding = 0.5 * p.backlash_gap * steep  # m/N
-    return (1.0 + yielding * stiffness) / p.backlash_crossing_time
+    return 0.5 * p.backlash_gap * (steep / p.backlash_seating_force + 1.0 / p.backlash_pin_force)
+
+
+@compiled
+def rate_over(step: float, offset: float, force: float, stiffness: float, p: Any) -> float:
+    """Return ds/dt, m/s, that holds at the end of a step, s, if it holds all over it.
+
+    offset: m, at its start. force: N, of the oil at its end if the offset stays. stiffness: of the
+    oil against the piston's motion, N/m. By Newton's method between bounds.
+    """
+    time = p.backlash_crossing_time + step
+    missing = flank(force, p) - offset
+    low, high = min(missing / time, 0.0), max(missing / time, 0.0)
+    found = 0.0
+    for _ in range(ITERATIONS):
+        there = force - step * stiffness * found
+        off = time * found - (flank(there, p) - offset)
+        if off < 0.0:
+            low = found
+        else:
+            high = found
+        before = found
+        found -= off / (time + step * stiffness * yielding(there, p))
+        if not low <= found <= high:
+            found = 0.5 * (low + high)
+        if abs(found - before) <= ACCURACY * abs(found):
+            break
+    return found

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.free_run import ANGLE, free_runs, rms
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
@@ -31,6 +31,7 @@ FINE_ACCURACY = 1e-5  # the same of the last fit: flat directions still matter o
 ROUGH = 3e-2  # the same where only the way to the optimum is wanted
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
+BEHIND = 1.5  # times the error of what a trial has to beat: further off, a fine fit changes nothing
 GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted before the whole
 SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
@@ -221,12 +222,12 @@ def moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:
     return point
 
 
-def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
+def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole.
 
     In the end with slopes of the free run itself, over short steps: near the optimum the coarse
     ones point a little beside it. Where no sensor tells p_S, the middle of what it may be at rest
-    is too far off to begin at. A hopeless trial is not polished.
+    is too far off to begin at. A hopeless trial is not polished, nor one far behind its rival.
     """
     rest = [
         np.zeros(2) if Starts(e, evidence).is_told else settled(known.machine, e, evidence)
@@ -235,10 +236,17 @@ def refine_free_run(known: Trial, evidence: Evidence) -> Trial:
     x = np.concatenate([known.x, *rest])
     problem = free_run_problem(known, evidence, x)
     near = fit(problem, ACCURACY)
-    if near.misfit > HOPELESS:
+    if near.misfit > min(HOPELESS, BEHIND * _misfit(rival, evidence)):
         return known.continued(near)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
     return known.continued(fit(fine, FINE_ACCURACY))
+
+
+def _misfit(rival: Trial | None, evidence: Evidence) -> float:
+    """Return the RMS of all errors of a free run in units of the noise, infinite of none."""
+    if rival is None:
+        return math.inf
+    return float(rms(np.concatenate(free_run_errors(rival.machine, evidence), axis=None)))
 
 
 def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 1.0) -> Problem:

@@ -39,6 +39,8 @@ FINER = tuple(s / 5.0 for s in range(-4, 5))  # steps about the best of these
 SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
+MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
+SAME = 6  # decimals of the cost, to which what leaves the same is told from rounding
 LOAD = "external_load"
 AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
@@ -144,22 +146,39 @@ class _Candidate:
     def fitted(self) -> Screened:
         """Fit the effects' fields, from where they are best or from where they ought to be."""
         points = np.array([self.x, self._reached])
-        begin = points[int(np.argmin([_soft(row) for row in self._inside(points)]))]
-        ends = [self.x]
-        if np.isfinite(self.expected):
-            nothing_held = np.zeros(self.x.size, dtype=bool)
-            problem = Problem(self._inside, begin, *self.bounds, nothing_held)
-            begins = [begin, *self._with_other_shares(begin)]
-            ends = [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
-        costs = [_soft(row) for row in self._inside(np.array(ends))]
-        best = int(np.argmin(costs))
-        return Screened(self._with_parameters(ends[best]), costs[best])
+        costs = [_soft(row) for row in self._inside(points)]
+        begin = points[int(np.argmin(costs))]
+        return self._best_fit([begin], Screened(self._with_parameters(self.x), costs[0]))
 
-    def _with_other_shares(self, own: Array) -> list[Array]:
-        """Return fields, (k,), with none and all of each share; fits may stop in between."""
+    def fitted_again(self, found: Screened) -> Screened:
+        """Fit them from none and from all of each share as well; fits may stop in between."""
+        own = found.trial.x[self._known :]
         shares = [(k, u) for k, u in enumerate(self._further) if u.is_share]
         ends = [(k, end) for k, share in shares for end in (share.low, share.high)]
-        return [moved(own, [k], [end]) for k, end in ends if end != own[k]]
+        others = [moved(own, [k], [end]) for k, end in ends if end != own[k]]
+        return self._best_fit(self._different([own, *others])[1:], found)
+
+    def _best_fit(self, begins: list[Array], found: Screened) -> Screened:
+        """Return the best fit from some fields, (k,), or what was found, if that is better."""
+        if not begins or not np.isfinite(self.expected):
+            return found
+        nothing_held = np.zeros(self.x.size, dtype=bool)
+        problem = Problem(self._inside, self.x, *self.bounds, nothing_held)
+        ends = [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
+        costs = [_soft(row) for row in self._inside(np.array(ends))]
+        best = int(np.argmin(costs))
+        if costs[best] >= found.cost:
+            return found
+        return Screened(self._with_parameters(ends[best]), costs[best])
+
+    def _different(self, points: list[Array]) -> list[Array]:
+        """Return fields, (k,), but those that leave what others before them do.
+
+        The direction of a load counts for nothing where all of it is on the piston.
+        """
+        costs = np.round([_soft(row) for row in self._inside(np.array(points))], SAME)
+        first = np.unique(costs, return_index=True)[1]
+        return [points[k] for k in sorted(first)]
 
     def stepped(self, missing: Missing) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
@@ -305,8 +324,12 @@ def _begun(
 
 
 def _fitted(begun: list[_Candidate]) -> list[Screened]:
+    """Return the most promising fitted, the best of them from other shares as well."""
     promising = sorted(begun, key=lambda c: c.expected)[:MOST_FITTED]
-    return sorted((c.fitted() for c in promising), key=lambda s: s.cost)
+    found = sorted(((c.fitted(), c) for c in promising), key=lambda pair: pair[0].cost)
+    again = [c.fitted_again(screened) for screened, c in found[:MOST_AGAIN]]
+    others = [screened for screened, _ in found[MOST_AGAIN:]]
+    return sorted([*again, *others], key=lambda s: s.cost)
 
 
 def _expected(one: _Candidate, other: _Candidate, nothing: Array) -> float:

@@ -76,7 +76,7 @@ class Whole:
         for effect in full.effects:
             alone = min(best.with_each_size(effect), key=self.score, default=None)
             if alone is not None:
-                best = min(best, refine_free_run(alone, self._evidence), key=self.score)
+                best = min(best, refine_free_run(alone, self._evidence, best), key=self.score)
         return best
 
     def _with_other_shares(self, fitted: Trial) -> Trial:
@@ -89,7 +89,7 @@ class Whole:
                 if self._excess(fitted) > LEFT**2 - 1.0 and fitted.x[k] != end:
                     x = fitted.x.copy()
                     x[k] = end
-                    again = refine_free_run(fitted.at(x), self._evidence)
+                    again = refine_free_run(fitted.at(x), self._evidence, fitted)
                     fitted = min(fitted, again, key=self.score)
         return fitted
 
@@ -124,7 +124,7 @@ class Whole:
         for name in ("frequency", "phase", "decay"):
             still = still.fixed(start + name, 0.0)
         lasting = fitted.fixed(start + "decay", 0.0)
-        ways = [refine_free_run(still, self._evidence), lasting]
+        ways = [refine_free_run(still, self._evidence, fitted), lasting]
         score = self.score(fitted)
         return next((way for way in ways if self.score(way) <= score), fitted)
 
@@ -137,7 +137,8 @@ class Whole:
         if not sticks(fitted):
             fitted = self._with_fewer_sizes(fitted)
         elif breakaway_may_be_none(fitted):
-            smooth = refine_free_run(without_breakaway(fitted, self._sheet), self._evidence)
+            plain = without_breakaway(fitted, self._sheet)
+            smooth = refine_free_run(plain, self._evidence, fitted)
             fitted = min(smooth, fitted, key=self.score)
         self.keep(fitted)
         return fitted

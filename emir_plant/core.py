@@ -227,6 +227,7 @@ def _write_boom(x: Array, motion: _Motion, dry: float, p: Any, dx: Array) -> Non
     load = external_load.force(x[TIME], p)
     beside = unnamed + external_load.on_piston(load, p)
     torque = (motion.force + beside - friction) * motion.arm
+    torque += external_load.about_joint(load, p)
     gravity = math.cos(motion.angle)
     across = external_load.at_tip(load, motion.angle, p)
     for i in range(n):

@@ -64,7 +64,8 @@ class Plant:
         load = p["mode_weight"] * math.cos(angle)
         load -= p["mode_tip"] * external_load.at_tip(outside, angle, p)
         torque = load[0] / p["mode_joint"][0]
-        force = torque / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
+        needed = torque - external_load.about_joint(outside, p)
+        force = needed / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
         force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)
         high = (force + low * p["area_lowering"]) / p["area_lifting"]
         if not 0.0 <= high <= p["p0"]:

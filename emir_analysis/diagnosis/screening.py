@@ -376,8 +376,8 @@ def _starts(
 
 
 def _fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Array:
-    """Return a load, across the boom where not on the piston, as its effect's fields, (10,)."""
-    values = (*load, piston_share, 0.0)
+    """Return a load, across the boom where not on the piston, as its effect's fields, (11,)."""
+    values = (*load, piston_share, 0.0, 0.0)
     return np.array([unknown.at(value) for unknown, value in zip(members, values, strict=True)])
 
 

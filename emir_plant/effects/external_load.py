@@ -18,8 +18,9 @@ class ExternalLoad(Effect):
     under it. f = 0 gives a constant load or, with a short duration, a pulse; f > 0 a harmonic one
     about a mean M. For piston_share of it a force along the piston's rod instead, outward positive,
     L / b times as large: at the longest lever arm b it has the moment of the one at the TCP, and
-    bends no arm. For vertical_share of the rest it is vertical, as a weight is, and acts by the
-    cosine of the boom's angle.
+    bends no arm. For joint_share of the rest a torque about the joint, L times as large at every
+    angle, which bends none either. For vertical_share of what is left it is vertical, as a weight
+    is, and acts by the cosine of the angle.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -35,6 +36,7 @@ class ExternalLoad(Effect):
         "duration": 1e3,
         "decay": 0.05,
         "piston_share": 0.5,
+        "joint_share": 0.5,
         "vertical_share": 0.5,
     }
 
@@ -49,8 +51,11 @@ class ExternalLoad(Effect):
     piston_share: float = quantity(
         "1", 0.0, 1.0, "of it, on the rod, L / b times as large", default=0.0
     )
+    joint_share: float = quantity(
+        "1", 0.0, 1.0, "of the rest, a torque about the joint, L times as large", default=0.0
+    )
     vertical_share: float = quantity(
-        "1", 0.0, 1.0, "of the rest, vertical, not across the boom", default=0.0
+        "1", 0.0, 1.0, "of what is left, vertical, not across the boom", default=0.0
     )
 
 
@@ -74,13 +79,21 @@ def at_tip(load: float, angle: float, p: Any) -> float:
     angle: of the boom to the horizontal, rad.
     """
     across = 1.0 - p.external_load_vertical_share * (1.0 - math.cos(angle))
-    return (1.0 - p.external_load_piston_share) * across * load
+    beside = (1.0 - p.external_load_piston_share) * (1.0 - p.external_load_joint_share)
+    return beside * across * load
 
 
 @compiled
 def on_piston(load: float, p: Any) -> float:
     """Return what of a load, N, acts along the piston's rod, N."""
     return p.external_load_piston_share * load * p.boom_length / p.triangle_b
+
+
+@compiled
+def about_joint(load: float, p: Any) -> float:
+    """Return what of a load, N, turns the boom about its joint, N m, upward positive."""
+    share = (1.0 - p.external_load_piston_share) * p.external_load_joint_share
+    return share * load * p.boom_length
 
 
 @compiled

@@ -226,7 +226,8 @@ def test_a_black_box_may_be_trained_where_a_signal_stays_as_it_is(angle: float) 
 def test_a_load_that_is_gone_before_the_last_third_speaks_to_the_balances() -> None:
     """No window of the last third knows of a load that acted from 2 to 6 s of 16 s."""
     sizes = {"force": 1500.0, "start": 2.0, "duration": 4.0}
-    others = ("mean", "frequency", "phase", "rise", "decay", "piston_share", "vertical_share")
+    others = ("mean", "frequency", "phase", "rise", "decay")
+    others += ("piston_share", "joint_share", "vertical_share")
     sizes |= dict.fromkeys(others, 0.0)
     pulse = {f"effects.external_load.{name}": value for name, value in sizes.items()}
     searched, sheet, evidence = search(pulse)
@@ -437,7 +438,7 @@ def test_a_load_that_hardly_swings_while_it_acts_is_steady() -> None:
     """On the piston from 4 to 8 s, fitted from a slow swing with a decay."""
     hidden = {"force": -1200.0, "start": 4.0, "duration": 4.0, "rise": 0.2, "piston_share": 1.0}
     slow = hidden | {"mean": 0.0, "frequency": 1e-3, "phase": -0.3, "decay": 1e-3}
-    slow |= {"vertical_share": 0.0}
+    slow |= {"joint_share": 0.0, "vertical_share": 0.0}
     searched, sheet, _ = search({f"effects.external_load.{n}": v for n, v in hidden.items()})
     begun = trial(sheet, ("external_load",)).with_one_size("external_load", "force")
     x = [

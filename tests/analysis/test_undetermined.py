@@ -25,14 +25,16 @@ def pushed() -> tuple[Trial, Evidence]:
         u.at(hidden.get(u.path, 0.0)) if not u.logarithmic else 0.0 for u in begun.unknowns.members
     ]
     known = begun.at(np.array(x))
-    return known.fixed(LOAD + "piston_share", 1.0).fixed(LOAD + "vertical_share", 0.0), evidence
+    for name, value in (("piston_share", 1.0), ("joint_share", 0.0), ("vertical_share", 0.0)):
+        known = known.fixed(LOAD + name, value)
+    return known, evidence
 
 
 def test_a_share_that_nothing_depends_on_is_not_determined() -> None:
-    """On the rod no force is vertical, but that it is on the rod is told."""
+    """On the rod no force is vertical nor about the joint, but that it is on the rod is told."""
     known, evidence = pushed()
     found = open_shares(known, evidence)
-    assert found == {LOAD + "vertical_share"}
+    assert found == {LOAD + "vertical_share", LOAD + "joint_share"}
     (effect,) = effect_results(known, {}, found)
     shown = {name: (p.low, p.high, p.note) for name, p in effect.parameters.items()}
     assert shown["vertical_share"] == (0.0, 1.0, OPEN)

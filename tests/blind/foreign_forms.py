@@ -150,6 +150,28 @@ class LoadOnPiston(Hidden):
         return super().accelerations(x, time, angle, push + force)
 
 
+class TurningLoad(Hidden):
+    """A torque about the joint that comes, goes and swings: a winch, a cable that pulls."""
+
+    name = "external_load~about the joint"
+    grows = ("torque",)
+    scales: ClassVar[dict[str, Scale]] = {"torque": boom_mass}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "torque": either_sign(random, 1e4, 5e4),
+            "torque_at": random.uniform(5.0, 25.0),
+            "turns_at": float(random.choice([0.0, between(random, 0.1, 0.4)])),
+        }
+
+    def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        since = time - self.sizes["torque_at"]
+        swing = math.cos(2.0 * math.pi * self.sizes["turns_at"] * since)
+        torque = self.sizes["torque"] * swing if since >= 0.0 else 0.0
+        return super().accelerations(x, time, angle, push + torque / self.lever_arm(angle))
+
+
 class HangingLoad(Hidden):
     """A weight that is hung on or taken off: vertical, at any angle of the boom."""
 
@@ -309,6 +331,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     DriftAtInlet,
     AsymmetryAtInlet,
     LoadOnPiston,
+    TurningLoad,
     HangingLoad,
     FillingHose,
     SlowLoad,

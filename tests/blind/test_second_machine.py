@@ -194,6 +194,15 @@ FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
             "piston_share": 1.0,
         },
     ),
+    _OTHER["external_load~about the joint"]: (
+        {"torque": 2e4, "torque_at": 0.7, "turns_at": 0.4},
+        {
+            "force": 2e4 / STATED.boom_length,
+            "frequency": 0.4,
+            "start": 0.7,
+            "joint_share": 1.0,
+        },
+    ),
     _OTHER["external_load~vertical"]: (
         {"hung_on": -1e3, "hung_at": 0.7, "swings_at": 0.4},
         {"force": -1e3, "frequency": 0.4, "start": 0.7, "vertical_share": 1.0},

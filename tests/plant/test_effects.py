@@ -308,6 +308,21 @@ def test_a_load_on_the_piston_is_carried_by_the_oil_and_bends_no_arm(degrees: fl
     assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
 
 
+@pytest.mark.parametrize("degrees", [30.0, 60.0])
+def test_a_torque_about_the_joint_is_carried_by_the_oil_and_bends_no_arm(degrees: float) -> None:
+    """Statics by hand: the oil pushes by F L / r less."""
+    angle = math.radians(degrees)
+    loaded = _with(external_load={"mean": 1e3, "joint_share": 1.0})
+    rest = loaded.initial(angle, 20e5)
+    rate = np.delete(loaded.derivative(rest, 0.0), core.TIME)
+    assert np.abs(rate).max() < 1e-5
+    before, after = PLAIN.outputs(PLAIN.initial(angle, 20e5)), loaded.outputs(rest)
+    arm = linkage.lever_arm(angle, PLAIN.record[0])
+    turned = 1e3 * MACHINE.geometry.boom_length
+    assert before.force - after.force == pytest.approx(turned / arm)
+    assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [45.0, 75.0])
 def test_a_vertical_load_is_a_weight(degrees: float) -> None:
     angle = math.radians(degrees)

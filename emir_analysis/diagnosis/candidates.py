@@ -83,9 +83,17 @@ class Trial:
 
     def with_each_size(self, effect: str) -> "list[Trial]":
         """Return the trial with each size of an effect alone, if it has several."""
-        paths = [unknown.path for unknown in self.unknowns.members]
-        sizes = [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
+        sizes = self._sizes(effect)
         return [self.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
+
+    def with_a_term_less(self, effect: str) -> "Trial | None":
+        """Return the trial without the last size of an effect, if there are others before it."""
+        sizes = self._sizes(effect)
+        return self._less([f"effects.{effect}.{sizes[-1]}"]) if len(sizes) > 1 else None
+
+    def _sizes(self, effect: str) -> list[str]:
+        paths = [unknown.path for unknown in self.unknowns.members]
+        return [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
 
     def fixed(self, path: str, value: float) -> "Trial":
         """Return the trial with a parameter at a value, SI unit, no longer to be fitted."""

@@ -28,6 +28,8 @@ SCALES: dict[str, Callable[[Machine], float]] = {  # by a size's unit; others st
     "Pa s/m^3": lambda m: m.supply.p0 / m.valve.flow_nominal,
     "1/m": lambda m: 1.0 / m.geometry.triangle_b,
     "1/m^2": lambda m: 1.0 / m.geometry.triangle_b**2,
+    "1/m^3": lambda m: 1.0 / m.geometry.triangle_b**3,
+    "1/m^4": lambda m: 1.0 / m.geometry.triangle_b**4,
 }
 
 

@@ -3,7 +3,14 @@
 import math
 from collections.abc import Callable
 
-from emir_analysis.diagnosis.candidates import HOPELESS, Trial, refine_free_run
+import numpy as np
+
+from emir_analysis.diagnosis.candidates import (
+    HOPELESS,
+    Trial,
+    free_run_errors,
+    refine_free_run,
+)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
@@ -19,8 +26,10 @@ from emir_analysis.diagnosis.select import STRONG, at_noise, excess, free_run_sc
 from emir_analysis.diagnosis.stick_slip import grown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
+from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
+TERM = 4.0  # squared errors, in units of the noise, that a term of a series takes away if it tells
 LEFT = 1.03  # RMS error of all signals in units of the noise, from which on a fit is gone on with
 
 Progress = Callable[[str], None]
@@ -74,10 +83,28 @@ class Whole:
         """
         best = full
         for effect in full.effects:
+            if REGISTRY[effect].is_series:
+                best = self._with_fewer_terms(best, effect)
+                continue
             alone = min(best.with_each_size(effect), key=self.score, default=None)
             if alone is not None:
                 best = min(best, refine_free_run(alone, self._evidence, best), key=self.score)
         return best
+
+    def _with_fewer_terms(self, best: Trial, effect: str) -> Trial:
+        """Return a trial without the last terms of a series, as far as they tell nothing."""
+        fewer = best.with_a_term_less(effect)
+        if fewer is None:
+            return best
+        fitted = refine_free_run(fewer, self._evidence, best)
+        if self._squares(fitted) > self._squares(best) + TERM:
+            return best
+        return self._with_fewer_terms(fitted, effect)
+
+    def _squares(self, fitted: Trial) -> float:
+        """Return the sum of the free run's squared errors in units of the noise."""
+        errors = free_run_errors(fitted.machine, self._evidence)
+        return float(sum(np.sum(np.square(error)) for error in errors))
 
     def _with_other_shares(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from none and all of its shares, where that is better.

@@ -20,6 +20,7 @@ class Effect:
     stepwise: names of the sizes that act only beyond some value, and too much soon after: a search
         goes through them in steps of their trial values.
     none_or_above: values of fields below which they count as none.
+    is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """
 
     balance: ClassVar[Balance]
@@ -28,6 +29,7 @@ class Effect:
     trial: ClassVar[dict[str, float]]
     stepwise: ClassVar[tuple[str, ...]] = ()
     none_or_above: ClassVar[dict[str, float]] = {}
+    is_series: ClassVar[bool] = False
 
     @property
     def is_on(self) -> bool:

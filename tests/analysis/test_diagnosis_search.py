@@ -434,6 +434,24 @@ def test_an_interval_has_the_digits_that_tell_its_ends_apart(
     assert max(len(s.replace(".", "").lstrip("0")) for s in shown) <= figures
 
 
+@pytest.mark.parametrize(
+    ("hidden", "terms"),
+    [
+        ({"scale": 0.015}, ["scale"]),
+        ({"scale": 0.015, "curvature": 0.1}, ["scale", "slope", "curvature"]),
+    ],
+)
+def test_a_series_keeps_the_terms_that_tell(hidden: dict[str, float], terms: list[str]) -> None:
+    """Those up to the last that tells."""
+    begun = search({f"effects.linkage_error.{name}": value for name, value in hidden.items()})
+    found = begun[0].whole.plainer(fitted(begun, "linkage_error"))
+    paths = [u.path.rsplit(".", 1)[1] for u in found.unknowns.members if not u.toleranced]
+    assert paths == terms
+    error = found.machine.effects.linkage_error
+    for name, value in hidden.items():
+        assert getattr(error, name) == pytest.approx(value, rel=0.1)
+
+
 def test_a_load_that_hardly_swings_while_it_acts_is_steady() -> None:
     """On the piston from 4 to 8 s, fitted from a slow swing with a decay."""
     hidden = {"force": -1200.0, "start": 4.0, "duration": 4.0, "rise": 0.2, "piston_share": 1.0}

@@ -361,16 +361,33 @@ def test_a_swing_decays_from_where_it_set_in() -> None:
 
 
 def test_linkage_error_is_the_stated_one_and_keeps_the_power() -> None:
-    error = {"scale": 0.01, "slope": 0.05, "curvature": -0.04}
+    error = {"scale": 0.01, "slope": 0.05, "curvature": -0.04, "cubic": 0.1, "quartic": -0.2}
     p = _with(linkage_error=error).record[0]
     for angle in np.radians(np.linspace(-10, 90, 21)):
         stated, h = linkage.lever_arm(angle, p), linkage.stroke(angle, p)
         arm = linkage_error.lever_arm(angle, p)
-        assert arm == pytest.approx(stated * (1.01 + 0.05 * h - 0.04 * h**2), rel=1e-12)
+        factor = 1.01 + 0.05 * h - 0.04 * h**2 + 0.1 * h**3 - 0.2 * h**4
+        assert arm == pytest.approx(stated * factor, rel=1e-12)
         step = 1e-5
         slope = linkage_error.stroke(angle + step, p) - linkage_error.stroke(angle - step, p)
         assert arm == pytest.approx(slope / (2 * step), rel=1e-8)
     assert linkage_error.stroke(0.0, p) == 0.0
+
+
+def test_a_linkage_error_comes_near_a_wave_of_one_period() -> None:
+    """As the document of the effect says: by all five terms, over the stroke from 0 to 80 deg."""
+    stated = PLAIN.record[0]
+    angles = np.radians(np.linspace(0.0, 80.0, 81))
+    h = linkage.strokes(angles, stated)
+    wave = 0.02 * np.sin(2.0 * math.pi * h / np.ptp(h))
+    terms_of_h = dict(
+        zip(linkage_error.LinkageError.sizes, np.polyfit(h, wave, 4)[::-1], strict=True)
+    )
+    p = _with(linkage_error={name: float(value) for name, value in terms_of_h.items()}).record[0]
+    made = np.array(
+        [linkage_error.lever_arm(a, p) / linkage.lever_arm(a, stated) - 1.0 for a in angles]
+    )
+    assert np.sqrt(np.mean((made - wave) ** 2)) < 0.125 * wave.std()
 
 
 def test_the_measured_stroke_is_that_of_the_stated_linkage() -> None:

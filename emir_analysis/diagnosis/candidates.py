@@ -250,6 +250,25 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     return known.continued(fit(fine, FINE_ACCURACY))
 
 
+def with_all_terms(known: Trial, effect: str, sheet: Sheet) -> Trial:
+    """Return a trial with all terms of a series to be fitted, begun at 0 where they were not."""
+    paths = [unknown.path for unknown in known.unknowns.members]
+    all_of_it = unknowns(replace(sheet, tolerances={}), (effect,)).members
+    more = tuple(unknown for unknown in all_of_it if unknown.path not in paths)
+    members = Unknowns(known.unknowns.machine, (*known.unknowns.members, *more))
+    x = np.append(known.x, np.zeros(len(more)))
+    return Trial(known.effects, members, x, np.full((x.size, x.size), np.nan))
+
+
+def with_fewer_terms(full: Trial, effect: str, evidence: Evidence) -> list[Trial]:
+    """Return a trial with fewer and fewer terms of a series, each fitted to the free run."""
+    found, fewer = [], full.with_a_term_less(effect)
+    while fewer is not None:
+        found.append(refine_free_run(fewer, evidence, full))
+        fewer = found[-1].with_a_term_less(effect)
+    return found
+
+
 def _misfit(rival: Trial | None, evidence: Evidence) -> float:
     """Return the RMS of all errors of a free run in units of the noise, infinite of none."""
     if rival is None:

@@ -86,16 +86,13 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         untold = np.full((start.size, start.size), np.inf)
         return Solution(start, untold, math.inf, np.zeros_like(untold))
 
-    latest = np.zeros_like(start), first
-
     def residuals(change: Array) -> Array:
-        nonlocal latest
-        if not np.array_equal(change, latest[0]):
-            latest = change.copy(), held.residuals((start + change)[None])[0]
-        return latest[1].copy()  # scipy works on what it is given
+        if not np.any(change):
+            return first
+        return np.asarray(held.residuals((start + change)[None])[0])
 
     def jacobian(change: Array) -> Array:
-        return held.slopes(start + change, residuals(change))
+        return held.slopes(start + change)[1]
 
     # As a change from the start, since the trust region is at first as large as what it is given,
     # or one for zero: where a fit begins is no measure of how far a first step may lead.
@@ -193,19 +190,16 @@ class _Held:
         """Return the residuals, (m, n + k), of points, (m, k)."""
         return np.hstack([self._problem.model(points), self._weight * (points - self._expected)])
 
-    def slopes(self, x: Array, residuals: Array) -> Array:
-        """Return the slopes, (n + k, k), of the residuals, (n + k,), at x, (k,)."""
+    def slopes(self, x: Array) -> tuple[Array, Array]:
+        """Return the residuals, (n + k,), at x, (k,), and their slopes, (n + k, k)."""
         problem = self._problem
         steps = np.where(x + problem.step > problem.high, -problem.step, problem.step)
-        neighbours = x + np.diag(steps)
-        if problem.coarse:
-            values = problem.coarse(np.vstack([x, neighbours]))
-        else:
-            values = np.vstack([residuals[: -x.size], problem.model(neighbours)])
+        values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
         slopes = (values[1:] - values[0]) / steps[:, None]
         # a neighbour that cannot be simulated says nothing about the slope
         slopes = np.nan_to_num(slopes.T, posinf=0.0, neginf=0.0)
-        return np.vstack([slopes, np.diag(self._weight)])
+        residuals = np.append(values[0], self._weight * (x - self._expected))
+        return residuals, np.vstack([slopes, np.diag(self._weight)])
 
     def first_slopes(self, x: Array) -> tuple[Array, Array, bool]:
         """Return the residuals, (n + k,), at x, (k,), and their slopes, (n + k, k).
@@ -213,14 +207,14 @@ class _Held:
         And whether they were taken along the principal axes of a fit before.
         """
         curvature = self._problem.curvature
-        residuals = self.residuals(x[None])[0]
         if curvature is not None:
+            residuals = self.residuals(x[None])[0]
             held = np.zeros((residuals.size, x.size))
             held[-x.size :] = np.diag(self._weight)
             _, slopes, complete = self.slopes_along(x, residuals, held, curvature)
             if complete:
                 return residuals, slopes, True
-        return residuals, self.slopes(x, residuals), False
+        return *self.slopes(x), False
 
     def slopes_along(
         self, x: Array, residuals: Array, former: Array, curvature: Array

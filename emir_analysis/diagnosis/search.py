@@ -12,6 +12,7 @@ from emir_analysis.diagnosis.candidates import (
     free_run_errors,
     refine_free_run,
     trial,
+    with_fewer_terms,
 )
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
@@ -33,6 +34,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
 from emir_analysis.diagnosis.whole import LEFT, Progress, Whole
+from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 MOST_EFFECTS = 3  # that are looked for in one machine
@@ -391,7 +393,10 @@ class Search:
             return replace(tried, free_run=free_run_score(full, self._evidence))
         ways = [full]
         for effect in full.effects:
-            ways += full.with_each_size(effect)
+            if REGISTRY[effect].is_series:
+                ways += with_fewer_terms(full, effect, self._head)
+            else:
+                ways += full.with_each_size(effect)
         scores = [free_run_score(way, self._evidence) for way in ways]
         best_way = int(np.argmin(scores))
         return Tried(ways[best_way], tried.balances, scores[best_way])

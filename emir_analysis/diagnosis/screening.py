@@ -238,12 +238,17 @@ class OnBalances:
 
         An effect that does not stay on is not in the list.
         """
-        return _fitted(self._begun)
+        promising = sorted(self._begun, key=lambda c: c.expected)[:MOST_FITTED]
+        found = sorted(((c.fitted(), c) for c in promising), key=lambda pair: pair[0].cost)
+        again = [c.fitted_again(screened) for screened, c in found[:MOST_AGAIN]]
+        others = [screened for screened, _ in found[MOST_AGAIN:]]
+        return sorted([*again, *others], key=lambda s: s.cost)
 
     def pairs(self) -> list[Screened]:
         """Return the known trial with two further effects, the best first.
 
-        For two that help only together. Which pairs are fitted is decided to first order.
+        For two that help only together. Which pairs are fitted is decided to first order; to try
+        other shares of them takes long, and fits to the free run do it.
         """
         known, left = self._known, self._left
         nothing = left.inside([known])[0][0]
@@ -254,7 +259,7 @@ class OnBalances:
         for one, other in pairs[:MOST_FITTED]:
             start = trial(self._sheet, (*known.effects, one.effect, other.effect), known)
             together.append(_Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
-        return _fitted(together)
+        return sorted((c.fitted() for c in together), key=lambda s: s.cost)
 
 
 def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:
@@ -321,15 +326,6 @@ def _begun(
             starts = _starts(name, members, loads, size)
             found.append(_Candidate(start, known.x.size, starts, left))
     return found
-
-
-def _fitted(begun: list[_Candidate]) -> list[Screened]:
-    """Return the most promising fitted, the best of them from other shares as well."""
-    promising = sorted(begun, key=lambda c: c.expected)[:MOST_FITTED]
-    found = sorted(((c.fitted(), c) for c in promising), key=lambda pair: pair[0].cost)
-    again = [c.fitted_again(screened) for screened, c in found[:MOST_AGAIN]]
-    others = [screened for screened, _ in found[MOST_AGAIN:]]
-    return sorted([*again, *others], key=lambda s: s.cost)
 
 
 def _expected(one: _Candidate, other: _Candidate, nothing: Array) -> float:

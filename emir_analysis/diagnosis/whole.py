@@ -103,14 +103,14 @@ class Whole:
         full = refine_free_run(with_all_terms(known, effect, self._sheet), self._evidence)
         ways = [full, *with_fewer_terms(full, effect, self._evidence)]
         squares = [self._squares(way) for way in ways]
-        return [
-            way for way, left in zip(ways, squares, strict=True) if left <= min(squares) + TERM
-        ][-1]
+        near = [left <= min(squares) + TERM for left in squares]
+        return [way for way, as_good in zip(ways, near, strict=True) if as_good][-1]
 
     def _squares(self, fitted: Trial) -> float:
-        """Return the sum of the free run's squared errors in units of the noise."""
+        """Return the sum of the free run's squared errors in units of the noise, inf of none."""
         errors = free_run_errors(fitted.machine, self._evidence)
-        return float(sum(np.sum(np.square(error)) for error in errors))
+        total = sum(float(np.sum(np.square(error))) for error in errors)
+        return math.inf if math.isnan(total) else total
 
     def _with_other_shares(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from none and all of its shares, where that is better.

@@ -1,8 +1,8 @@
 """Play between piston and joint: the piston crosses it when the force changes sign.
 
 While the piston crosses, next to no force is on it, and force and play settle within microseconds,
-whatever the boom does. Over a step that is too long to follow that the rate is the one at which
-the step ends (implicit Euler for this one rate), as for dry friction that sticks.
+whatever the boom does. A step that is too long to follow that is crossed at the rate that holds at
+its end (implicit Euler for this one rate), as for dry friction that sticks.
 """
 
 from dataclasses import dataclass

@@ -33,7 +33,7 @@ class LinkageError(Effect):
     is_series: ClassVar[bool] = True
 
     scale: float = quantity("1", -0.5, 0.5, "relative error of r at h = 0", default=0.0)
-    slope: float = quantity("1/m", -5.0, 5.0, "its growth with the stroke", default=0.0)
+    slope: float = quantity("1/m", -0.5, 0.5, "its growth with the stroke", default=0.0)
     curvature: float = quantity("1/m^2", -20.0, 20.0, "and with its square", default=0.0)
     cubic: float = quantity("1/m^3", -100.0, 100.0, "with its third power", default=0.0)
     quartic: float = quantity("1/m^4", -500.0, 500.0, "and its fourth", default=0.0)

@@ -95,8 +95,23 @@ class _Allowed(NamedTuple):
     crossing: bool  # play and oil settle too fast for it
 
 
+class _Oil(NamedTuple):
+    """What the piston's stroke, m, does to the oil of shut chambers."""
+
+    lifting: float  # p_H falls by so much, Pa/m
+    lowering: float  # p_S rises by so much, Pa/m
+    stiffness: float  # the force falls by so much, N/m
+
+
 @compiled_in_place
 def _motion(x: Array, p: Any) -> _Motion:
+    standing = _standing(x, p)
+    return _crossing(standing, backlash.rate(x[OFFSET], standing.force, p))
+
+
+@compiled_in_place
+def _standing(x: Array, p: Any) -> _Motion:
+    """Return the motion with the play as it stands."""
     n = p.mode_joint.size
     angle, tip_angle, turning = 0.0, 0.0, 0.0
     for i in range(n):
@@ -105,31 +120,29 @@ def _motion(x: Array, p: Any) -> _Motion:
         turning += p.mode_joint[i] * x[MODES + n + i]
     arm = linkage_error.lever_arm(angle, p)
     joint_velocity = arm * turning
-    force = chambers.piston_force(x[P_H], x[P_S], p)
-    offset_rate = backlash.rate(x[OFFSET], force, p)
     return _Motion(
         angle,
         tip_angle,
         arm,
         linkage_error.stroke(angle, p) + x[OFFSET],
-        joint_velocity + offset_rate,
         joint_velocity,
-        force,
-        offset_rate,
+        joint_velocity,
+        chambers.piston_force(x[P_H], x[P_S], p),
+        0.0,
     )
 
 
 @compiled_in_place
-def _crossing(motion: _Motion, rate: float) -> _Motion:
+def _crossing(standing: _Motion, rate: float) -> _Motion:
     """Return the motion with the play crossed at a rate, m/s."""
     return _Motion(
-        motion.angle,
-        motion.tip_angle,
-        motion.arm,
-        motion.stroke,
-        motion.joint_velocity + rate,
-        motion.joint_velocity,
-        motion.force,
+        standing.angle,
+        standing.tip_angle,
+        standing.arm,
+        standing.stroke,
+        standing.joint_velocity + rate,
+        standing.joint_velocity,
+        standing.force,
         rate,
     )
 
@@ -309,24 +322,20 @@ def _settling_step(x: Array, dt: float, p: Any) -> float:
     """
     if p.backlash_gap == 0.0:
         return math.inf
-    motion = _motion(x, p)
-    lifting, lowering = _pressure_by_stroke(x, motion.stroke, p)
-    stiffness = lifting * p.area_lifting + lowering * p.area_lowering
-    nearest = max(abs(motion.force) - stiffness * FASTEST * dt, 0.0)
+    standing = _standing(x, p)
+    stiffness = _oil(x, standing.stroke, p).stiffness
+    nearest = max(abs(standing.force) - stiffness * FASTEST * dt, 0.0)
     return SETTLING / backlash.settling_rate(stiffness, nearest, p)
 
 
 @compiled_in_place
-def _pressure_by_stroke(x: Array, stroke: float, p: Any) -> tuple[float, float]:
-    """Return by how much p_H falls and p_S rises with the piston's stroke, m, in shut chambers.
-
-    In Pa/m.
-    """
+def _oil(x: Array, stroke: float, p: Any) -> _Oil:
+    """Return what the piston does to the oil at its stroke, m."""
     volume = chambers.volume_lifting(stroke, p)
     lifting = terms.stiffness_lifting(x[P_H], volume, p) * p.area_lifting / volume
     volume = chambers.volume_lowering(stroke, p)
     lowering = terms.stiffness_lowering(x[P_S], volume, p) * p.area_lowering / volume
-    return lifting, lowering
+    return _Oil(lifting, lowering, lifting * p.area_lifting + lowering * p.area_lowering)
 
 
 @compiled_in_place
@@ -385,13 +394,11 @@ def _cross(x: Array, h: float, p: Any, dx: Array) -> _Play:
 
     dx: those, with the offset as it stands.
     """
-    stroke = _motion(x, p).stroke
-    lifting, lowering = _pressure_by_stroke(x, stroke, p)
-    stiffness = lifting * p.area_lifting + lowering * p.area_lowering
+    oil = _oil(x, _standing(x, p).stroke, p)
     ahead = chambers.piston_force(x[P_H] + h * dx[P_H], x[P_S] + h * dx[P_S], p)
-    rate = backlash.rate_over(h, x[OFFSET], ahead, stiffness, p)
-    dx[P_H] -= lifting * rate
-    dx[P_S] += lowering * rate
+    rate = backlash.rate_over(h, x[OFFSET], ahead, oil.stiffness, p)
+    dx[P_H] -= oil.lifting * rate
+    dx[P_S] += oil.lowering * rate
     dx[OFFSET] = rate
     return _Play(rate, True)
 
@@ -402,9 +409,7 @@ def _write_first_rates(
 ) -> dry_friction.Friction:
     """Write dx/dt at the start of a step, but for play that is crossed; return its dry friction."""
     n, left, usual = p.mode_joint.size, allowed.left, allowed.usual
-    motion = _motion(x, p)
-    if allowed.crossing:
-        motion = _crossing(motion, 0.0)
+    motion = _standing(x, p) if allowed.crossing else _motion(x, p)
     _write_rates(x, command, motion, 0.0, p, dx)
     if not terms.has_dry_friction(p):
         return dry_friction.Friction(left, 0.0, False)
@@ -447,9 +452,7 @@ def _write_later_rates(  # noqa: PLR0913, PLR0917 (as _advance)
     x: Array, command: float, dry: dry_friction.Friction, play: _Play, p: Any, dx: Array
 ) -> None:
     """Write dx/dt at a later stage of a step under its dry friction and with its play."""
-    motion = _motion(x, p)
-    if play.held:
-        motion = _crossing(motion, play.rate)
+    motion = _crossing(_standing(x, p), play.rate) if play.held else _motion(x, p)
     force = dry.force
     if not dry.held:
         force = terms.dry_friction(motion.joint_velocity, _situation(motion), p)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs, rms
+from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
@@ -244,7 +244,8 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     x = np.concatenate([known.x, *rest])
     problem = free_run_problem(known, evidence, x)
     near = fit(problem, ACCURACY)
-    if near.misfit > min(HOPELESS, BEHIND * _misfit(rival, evidence)):
+    behind = math.inf if rival is None else BEHIND * math.sqrt(mean_square(rival, evidence))
+    if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
     return known.continued(fit(fine, FINE_ACCURACY))
@@ -267,13 +268,6 @@ def with_fewer_terms(full: Trial, effect: str, evidence: Evidence) -> list[Trial
         found.append(refine_free_run(fewer, evidence, full))
         fewer = found[-1].with_a_term_less(effect)
     return found
-
-
-def _misfit(rival: Trial | None, evidence: Evidence) -> float:
-    """Return the RMS of all errors of a free run in units of the noise, infinite of none."""
-    if rival is None:
-        return math.inf
-    return float(rms(np.concatenate(free_run_errors(rival.machine, evidence), axis=None)))
 
 
 def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 1.0) -> Problem:
@@ -319,6 +313,13 @@ def free_run_errors(machine: Machine, evidence: Evidence) -> list[Array]:
         error = (free_run(machine, experiment, evidence) - experiment.outputs) / evidence.sensors
         found.append(error[:, evidence.shown])
     return found
+
+
+def mean_square(tried: Trial, evidence: Evidence) -> float:
+    """Return the mean square of all signals' free-run errors in units of the noise."""
+    errors = np.concatenate(free_run_errors(tried.machine, evidence))
+    with np.errstate(over="ignore"):  # of a run out of all bounds
+        return float(np.mean(errors**2))
 
 
 def coarse_errors(

@@ -145,10 +145,8 @@ class _Candidate:
 
     def fitted(self) -> Screened:
         """Fit the effects' fields, from where they are best or from where they ought to be."""
-        points = np.array([self.x, self._reached])
-        costs = [_soft(row) for row in self._inside(points)]
-        begin = points[int(np.argmin(costs))]
-        return self._best_fit([begin], Screened(self._with_parameters(self.x), costs[0]))
+        begin, _ = self._best([self.x, self._reached])
+        return self._screened([self.x, *self._ends([begin])])
 
     def fitted_again(self, found: Screened) -> Screened:
         """Fit them from none and from all of each share as well; fits may stop in between."""
@@ -156,20 +154,21 @@ class _Candidate:
         shares = [(k, u) for k, u in enumerate(self._further) if u.is_share]
         ends = [(k, end) for k, share in shares for end in (share.low, share.high)]
         others = [moved(own, [k], [end]) for k, end in ends if end != own[k]]
-        return self._best_fit(self._different([own, *others])[1:], found)
+        _, *begins = self._different([own, *others])
+        return self._screened([own, *self._ends(begins)]) if begins else found
 
-    def _best_fit(self, begins: list[Array], found: Screened) -> Screened:
-        """Return the best fit from some fields, (k,), or what was found, if that is better."""
-        if not begins or not np.isfinite(self.expected):
-            return found
+    def _ends(self, begins: list[Array]) -> list[Array]:
+        """Return where fits from some fields, (k,), end; none where nothing is foreseen."""
+        if not np.isfinite(self.expected):
+            return []
         nothing_held = np.zeros(self.x.size, dtype=bool)
         problem = Problem(self._inside, self.x, *self.bounds, nothing_held)
-        ends = [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
-        costs = [_soft(row) for row in self._inside(np.array(ends))]
-        best = int(np.argmin(costs))
-        if costs[best] >= found.cost:
-            return found
-        return Screened(self._with_parameters(ends[best]), costs[best])
+        return [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
+
+    def _screened(self, points: list[Array]) -> Screened:
+        """Return the trial at the best of some fields, (k,), with its parameters at their best."""
+        best, left = self._best(points)
+        return Screened(self._with_parameters(best), _soft(left))
 
     def _different(self, points: list[Array]) -> list[Array]:
         """Return fields, (k,), but those that leave what others before them do.

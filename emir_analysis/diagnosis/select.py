@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from emir_analysis.diagnosis.balances import FORCE_WINDOW, level
-from emir_analysis.diagnosis.candidates import Trial, free_run_errors
+from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -116,9 +116,7 @@ def excess(tried: Trial, evidence: Evidence) -> float:
 
     Of all together: the stroke alone is uncertain, at rest the resolver stays in one step.
     """
-    errors = np.concatenate(free_run_errors(tried.machine, evidence))
-    with np.errstate(over="ignore"):  # of a run out of all bounds
-        return float(np.mean(errors**2) - 1.0)
+    return mean_square(tried, evidence) - 1.0
 
 
 def at_noise(tried: Trial, evidence: Evidence) -> bool:

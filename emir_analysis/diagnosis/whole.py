@@ -9,6 +9,7 @@ from emir_analysis.diagnosis.candidates import (
     HOPELESS,
     Trial,
     free_run_errors,
+    mean_square,
     moved,
     refine_free_run,
     with_all_terms,
@@ -102,15 +103,10 @@ class Whole:
         """
         full = refine_free_run(with_all_terms(known, effect, self._sheet), self._evidence)
         ways = [full, *with_fewer_terms(full, effect, self._evidence)]
-        squares = [self._squares(way) for way in ways]
-        near = [left <= min(squares) + TERM for left in squares]
-        return [way for way, as_good in zip(ways, near, strict=True) if as_good][-1]
-
-    def _squares(self, fitted: Trial) -> float:
-        """Return the sum of the free run's squared errors in units of the noise, inf of none."""
-        errors = free_run_errors(fitted.machine, self._evidence)
-        total = sum(float(np.sum(np.square(error))) for error in errors)
-        return math.inf if math.isnan(total) else total
+        count = sum(error.size for error in free_run_errors(known.machine, self._evidence))
+        left = np.array([mean_square(way, self._evidence) for way in ways])
+        as_good = np.flatnonzero(left <= np.nanmin(left) + TERM / count)
+        return ways[int(as_good[-1])]
 
     def _with_other_shares(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from none and all of its shares, where that is better.

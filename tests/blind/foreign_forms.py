@@ -128,6 +128,11 @@ class AsymmetryAtInlet(_AtInlet):
         return 1.0 + self.size("inlet_lifting" if opening > 0.0 else "inlet_lowering")
 
 
+def _swung(since: float, frequency: float) -> float:
+    """Return the share of a load that swings, a time, s, since it came."""
+    return math.cos(2.0 * math.pi * frequency * since) if since >= 0.0 else 0.0
+
+
 class LoadOnPiston(Hidden):
     """A force along the piston's rod: what leans on the cylinder, comes within a while and goes."""
 
@@ -151,7 +156,7 @@ class LoadOnPiston(Hidden):
 
 
 class TurningLoad(Hidden):
-    """A torque about the joint that comes, goes and swings: a winch, a cable that pulls."""
+    """A torque about the joint that comes and stays, or swings: a winch, a cable that pulls."""
 
     name = "external_load~about the joint"
     grows = ("torque",)
@@ -166,9 +171,8 @@ class TurningLoad(Hidden):
         }
 
     def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
-        since = time - self.sizes["torque_at"]
-        swing = math.cos(2.0 * math.pi * self.sizes["turns_at"] * since)
-        torque = self.sizes["torque"] * swing if since >= 0.0 else 0.0
+        s = self.sizes
+        torque = s["torque"] * _swung(time - s["torque_at"], s["turns_at"])
         return super().accelerations(x, time, angle, push + torque / self.lever_arm(angle))
 
 
@@ -187,9 +191,8 @@ class HangingLoad(Hidden):
         }
 
     def weight(self, time: float, angle: float) -> Array:
-        since = time - self.sizes["hung_at"]
-        swing = math.cos(2.0 * math.pi * self.sizes["swings_at"] * since)
-        hung = self.sizes["hung_on"] * swing if since >= 0.0 else 0.0
+        s = self.sizes
+        hung = s["hung_on"] * _swung(time - s["hung_at"], s["swings_at"])
         return super().weight(time, angle) - self.boom.tip * hung * math.cos(angle)
 
 

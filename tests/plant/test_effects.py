@@ -293,33 +293,21 @@ def test_a_constant_load_is_carried_by_the_piston_and_bends_the_boom() -> None:
     assert after.tcp_deflection - before.tcp_deflection == pytest.approx(cantilever, rel=0.05)
 
 
+@pytest.mark.parametrize("share", ["piston_share", "joint_share"])
 @pytest.mark.parametrize("degrees", [30.0, 60.0])
-def test_a_load_on_the_piston_is_carried_by_the_oil_and_bends_no_arm(degrees: float) -> None:
-    """Statics by hand: the oil pushes by F L / b less, at any angle."""
+def test_a_load_on_the_piston_or_the_joint_is_carried_by_the_oil_and_bends_no_arm(
+    degrees: float, share: str
+) -> None:
+    """Statics by hand: the oil pushes by F L / b less at any angle, or by F L / r."""
     angle = math.radians(degrees)
-    loaded = _with(external_load={"mean": 1e3, "piston_share": 1.0})
+    loaded = _with(external_load={"mean": 1e3, share: 1.0})
     rest = loaded.initial(angle, 20e5)
     rate = np.delete(loaded.derivative(rest, 0.0), core.TIME)
     assert np.abs(rate).max() < 1e-5
     before, after = PLAIN.outputs(PLAIN.initial(angle, 20e5)), loaded.outputs(rest)
     g = MACHINE.geometry
-    pushed = 1e3 * g.boom_length / g.triangle_b
-    assert before.force - after.force == pytest.approx(pushed)
-    assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
-
-
-@pytest.mark.parametrize("degrees", [30.0, 60.0])
-def test_a_torque_about_the_joint_is_carried_by_the_oil_and_bends_no_arm(degrees: float) -> None:
-    """Statics by hand: the oil pushes by F L / r less."""
-    angle = math.radians(degrees)
-    loaded = _with(external_load={"mean": 1e3, "joint_share": 1.0})
-    rest = loaded.initial(angle, 20e5)
-    rate = np.delete(loaded.derivative(rest, 0.0), core.TIME)
-    assert np.abs(rate).max() < 1e-5
-    before, after = PLAIN.outputs(PLAIN.initial(angle, 20e5)), loaded.outputs(rest)
-    arm = linkage.lever_arm(angle, PLAIN.record[0])
-    turned = 1e3 * MACHINE.geometry.boom_length
-    assert before.force - after.force == pytest.approx(turned / arm)
+    lever = {"piston_share": g.triangle_b, "joint_share": linkage.lever_arm(angle, PLAIN.record[0])}
+    assert before.force - after.force == pytest.approx(1e3 * g.boom_length / lever[share])
     assert after.tcp_deflection == pytest.approx(before.tcp_deflection, rel=1e-6)
 
 

@@ -12,7 +12,7 @@ from emir_analysis.control_protocols import Signals, Topics
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
-from emir_control.lqg import Lqg, LqgInputs, LqgOutputs
+from emir_control.lqg import UNMEASURED, Lqg, LqgInputs, LqgOutputs, are_numbers
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.prefilter import (
     PrefilterParameters,
@@ -246,15 +246,19 @@ class LqgControl:
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""
         inputs = self._inputs(signals)
+        if state is None and not are_numbers(inputs):
+            return None, self._signals(UNMEASURED, 0.0)
         state, outputs = self.lqg.step(state or self.lqg.initial(inputs), inputs, dt)
         return state, self._signals(outputs, outputs.valve_command)
 
     def stand_by(self, state: Any, signals: Signals) -> tuple[Any, Signals]:
         """Return the next state while another drives, and what is offered. state None: begin."""
         inputs = self._inputs(signals)
+        if state is None and not are_numbers(inputs):
+            return None, self._signals(UNMEASURED, 0.0, ready=False)
         state, ready = self.lqg.stand_by(state or self.lqg.initial(inputs), inputs)
         waiting = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
-        command = state.command if state.joins else 0.0
+        command = state.sent.command if state.joins else 0.0
         return state, self._signals(waiting, command, ready=ready)
 
     def _signals(self, outputs: LqgOutputs, command: float, *, ready: bool = True) -> Signals:

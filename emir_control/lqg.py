@@ -30,6 +30,7 @@ from emir_control.prefilter import (
     piston_velocity,
 )
 from emir_control.regulator import Filter, Regulator, RegulatorParameters, regulator
+from emir_control.spool_play import SHUT, Sent, taken_up
 from emir_control.trajectory import NO_MOVE, Move
 
 Array = NDArray[np.float64]
@@ -100,7 +101,7 @@ class LqgState(NamedTuple):
 
     offset: of the measured bending, rad, in gravity of cos(alpha) = 1. estimate: (n,) x. past,
     openings: u off the plan, m/s, and openings of the valve of commands that are under way, the
-    newest first. logic: block's opening. command: the last one. moving: a move is under way or is
+    newest first. logic: block's opening. sent: the last command. moving: a move is under way or is
     to begin. filled: what a filling of the lowering chamber has told. cut: the move was to end too
     near to an end of the stroke. surprise: mean squared innovation, 1 as expected. loaded: a load
     seems to come or to go. reference: m, of the last period of standing by. known: it stands by
@@ -116,7 +117,7 @@ class LqgState(NamedTuple):
     past: tuple[float, ...]
     openings: tuple[float, ...]
     logic: float
-    command: float
+    sent: Sent
     moving: bool
     filled: Filled
     cut: bool = False
@@ -151,6 +152,14 @@ class LqgOutputs(NamedTuple):
     limited: bool = False  # off an end of the stroke: the command, or the move as planned
 
 
+UNMEASURED = LqgOutputs(0.0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+def are_numbers(inputs: LqgInputs) -> bool:
+    """Tell whether reference and measurements are numbers."""
+    return all(map(math.isfinite, (inputs.reference, *inputs[2:])))
+
+
 class Now(NamedTuple):
     """When a command acts, s since the plan's start, for how long, s, and on what oil."""
 
@@ -178,21 +187,20 @@ class Lqg:
         return Planner(self.drive, p.period, self._late, p.allowance)
 
     def initial(self, inputs: LqgInputs) -> LqgState:
-        """Return the state of a machine that rests with what is measured now."""
+        """Return the state of a machine that rests with what is measured now, all numbers."""
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         rest = Rest(1, force, inputs.deflection, inputs.angle)
         piloted = inputs.pressure_lifting > self.parameters.actuator.threshold
         start = inputs._replace(move=NO_MOVE)
-        return self._begin(rest, start, float(piloted), 0.0, NOT_FILLED)
+        return self._begin(rest, start, float(piloted), SHUT, NOT_FILLED)
 
     def step(self, state: LqgState, inputs: LqgInputs, dt: float) -> tuple[LqgState, LqgOutputs]:
         """Return the valve command of this control period of dt, s.
 
-        An input that is not a number shuts the valve and begins anew.
+        An input that is not a number shuts the valve; with the next that is one it goes on.
         """
-        if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
-            nan = math.nan
-            return state._replace(command=0.0), LqgOutputs(0.0, nan, nan, nan, nan, nan, nan)
+        if not are_numbers(inputs):
+            return state._replace(sent=SHUT), UNMEASURED
         state = self._prepared(state, inputs)
         if self._to_fill(state, inputs):
             return self._filling(state, inputs, dt)
@@ -224,7 +232,7 @@ class Lqg:
         given = self.drive.velocity(opening, oil) - from_plan
         after = self._moved(state, estimate, given, opening, inputs)
         outputs = LqgOutputs(
-            after.command,
+            after.sent.command,
             from_plan,
             wanted,
             float(estimate[law.flow]),
@@ -241,7 +249,7 @@ class Lqg:
         It may where the reference has rested for long enough to read the payload, swinging boom or
         not; and in a move that it has watched from the start, with time left.
         """
-        if not all(map(math.isfinite, (inputs.reference, *inputs[2:]))):
+        if not are_numbers(inputs):
             return state._replace(reference=math.nan, known=False, joins=False), False
         moves = inputs.reference != state.reference or self._under_way(inputs.move)
         enough = STANDING_BY * self._enough
@@ -249,7 +257,7 @@ class Lqg:
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
         state = state._replace(rest=rest, moving=False, filled=NOT_FILLED, logic=logic)
         if rest.periods == enough:
-            state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, 0.0, NOT_FILLED)
+            state = self._begin(rest, inputs._replace(move=NO_MOVE), logic, SHUT, NOT_FILLED)
         elif rest.periods < enough:
             state = self._watched(state, inputs)
         place = state.plan.at(math.inf).stroke
@@ -271,7 +279,8 @@ class Lqg:
         oil = Oil(stroke, inputs.pressure_lifting, inputs.pressure_lowering, state.logic)
         opening = self.drive.opening(float(state.estimate[state.regulator.flow]), _open(oil))
         openings = (opening,) * len(state.openings)
-        return state._replace(command=self.drive.command(opening), openings=openings)
+        demand = self.drive.command(opening)
+        return state._replace(sent=Sent(demand, demand), openings=openings)
 
     def _joined(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state that leads the move under way, another one's, to its end."""
@@ -325,7 +334,7 @@ class Lqg:
         """Return the shut valve of a move that is planned and has not begun."""
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, self.parameters.period)
         outputs = LqgOutputs(0.0, 0.0, 0.0, 0.0, 0.0, state.payload, 0.0)
-        return state._replace(command=0.0, logic=logic), outputs
+        return state._replace(sent=SHUT, logic=logic), outputs
 
     def _to_fill(self, state: LqgState, inputs: LqgInputs) -> bool:
         """Tell whether the lowering chamber has to be filled before the move that comes."""
@@ -352,13 +361,14 @@ class Lqg:
         pushed = (force - heavier * state.rest.force) / drive.stiffness(stroke)
         given = max(velocity + self.parameters.fill.damping * pushed, 0.0)
         opening = drive.opening(-given, oil)
-        command = drive.command(opening) - (0.5 * self.parameters.hysteresis if given else 0.0)
+        demand = drive.command(opening)
+        sent = Sent(demand, demand - (0.5 * self.parameters.hysteresis if given else 0.0))
         logic = drive.next_logic(state.logic, inputs.pressure_lifting, dt)
         moved = state.filled.moved - given * dt
         filled = Filled(moved, velocity)
-        outputs = LqgOutputs(command, -velocity, -given, 0.0, 0.0, state.payload, 0.0)
+        outputs = LqgOutputs(sent.command, -velocity, -given, 0.0, 0.0, state.payload, 0.0)
         rest = state.rest._replace(periods=0)
-        after = state._replace(command=command, logic=logic, filled=filled, rest=rest)
+        after = state._replace(sent=sent, logic=logic, filled=filled, rest=rest)
         return after, outputs
 
     def _weight(self, angle: float) -> float:
@@ -370,7 +380,7 @@ class Lqg:
         rest = state.rest._replace(angle=inputs.angle)
         filled = state.filled._replace(over=True)
         here = inputs._replace(move=NO_MOVE)
-        return self._begin(rest, here, state.logic, state.command, filled)
+        return self._begin(rest, here, state.logic, state.sent, filled)
 
     def _onward(self, state: LqgState, inputs: LqgInputs) -> LqgState:
         """Return the state at the start of a move from where the chamber was filled.
@@ -378,7 +388,7 @@ class Lqg:
         What is known of the swing and of what is under way stays known.
         """
         rest = state.rest._replace(angle=float(state.plan.angle[-1]))
-        begun = self._begin(rest, inputs, state.logic, state.command, state.filled)
+        begun = self._begin(rest, inputs, state.logic, state.sent, state.filled)
         return begun._replace(
             estimate=state.estimate, past=state.past, openings=state.openings, rest=state.rest
         )
@@ -393,7 +403,7 @@ class Lqg:
                 return state
             if state.filled.over:
                 return self._onward(state, inputs)
-            return self._begin(state.rest, inputs, state.logic, state.command, state.filled)
+            return self._begin(state.rest, inputs, state.logic, state.sent, state.filled)
         last = state.rest
         force = self.drive.force(inputs.pressure_lifting, inputs.pressure_lowering)
         other = abs(force - last.force) > p.other_load
@@ -405,7 +415,7 @@ class Lqg:
         off = rest.force - state.plan.at(math.inf).force
         if count == self._enough and abs(off) > p.other_load and not filled.moved:
             resting_on = inputs._replace(move=NO_MOVE)
-            return self._begin(rest, resting_on, state.logic, state.command, filled)
+            return self._begin(rest, resting_on, state.logic, state.sent, filled)
         return state._replace(rest=rest, moving=False, filled=filled)
 
     @property
@@ -430,14 +440,14 @@ class Lqg:
         return self.parameters.boom.payload(force / self._weight(angle))
 
     def _begin(
-        self, rest: Rest, inputs: LqgInputs, logic: float, command: float, filled: Filled
+        self, rest: Rest, inputs: LqgInputs, logic: float, sent: Sent, filled: Filled
     ) -> LqgState:
         """Return the state at the start of a move, or of a rest, with what was read at rest."""
         p, drive, move = self.parameters, self.drive, inputs.move
         linkage = p.actuator.static
         ends = inputs.reference, inputs.reference + move.distance
-        start, end = here, _ = self._off_the_ends(rest, ends)
-        cut = (start, end) != ends
+        here, end = self._off_the_ends(rest, ends)
+        start, cut = here, (here, end) != ends
         if filled.moved:
             start = piston_stroke(rest.angle, linkage)
         move = move._replace(distance=end - start if move.distance else 0.0)
@@ -452,8 +462,11 @@ class Lqg:
         hanging = float(plan.bending[0]) / math.cos(float(plan.angle[0]))
         offset = rest.bending / math.cos(angle) - hanging
         past = (0.0,) * law.delays
-        memory = past, past, logic, command, inputs.move.distance != 0.0, filled, cut
-        return LqgState(plan, law, payload, offset, rest, estimate, *memory)
+        return LqgState(
+            plan=plan, regulator=law, payload=payload, offset=offset, rest=rest,
+            estimate=estimate, past=past, openings=past, logic=logic, sent=sent,
+            moving=inputs.move.distance != 0.0, filled=filled, cut=cut,
+        )  # fmt: skip
 
     def _plan(self, boom: Boom, start: float, move: Move) -> MotionPlan:
         if move.distance == 0.0:
@@ -523,16 +536,14 @@ class Lqg:
         ahead = law.A @ estimate + law.B @ np.array(given_all)
         if opening == 0.0:  # a shut valve lets no unknown flow through
             ahead[law.flow] *= SHUT_DECAY
-        command = self.drive.command(opening)
-        if command not in {state.command, 0.0}:  # the spool's play, taken up ahead
-            command += math.copysign(0.5 * self.parameters.hysteresis, command - state.command)
+        demand = self.drive.command(opening)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, period)
         return state._replace(
             estimate=ahead,
             past=given_all[:-1],
             openings=(opening, *state.openings)[:-1],
             logic=logic,
-            command=command,
+            sent=taken_up(demand, state.sent, self.parameters.hysteresis),
         )
 
 

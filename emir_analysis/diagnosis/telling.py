@@ -10,9 +10,9 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.select import STRONG, free_run_score
+from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
-from emir_plant.effects import REGISTRY
 
 # what only this balance shows: effects that can otherwise not be named, or not be told apart
 ONLY_HERE = {
@@ -26,7 +26,6 @@ ONLY_HERE = {
 REACHES = np.geomspace(1e-2, 1e3, 16)  # in trial values
 TWO_DEVIATIONS = 4.0  # by how much a score is worse there
 REST = 1.0  # s
-PERIOD = 10e-3  # s, between the samples that are compared
 
 
 def _moves(*pieces: tuple[float, float]) -> Array:
@@ -69,12 +68,9 @@ def open_shares(chosen: Trial, evidence: Evidence) -> frozenset[str]:
     fitted = {unknown.path for unknown in chosen.unknowns.members}
     score = free_run_score(chosen, evidence, seen=0.0)
     found = set()
-    for path, (about, value) in declared(chosen.machine).items():
-        group, *names = path.split(".")
-        if group != "effects" or names[0] not in chosen.effects or path in fitted:
-            continue
-        is_share = about.unit == "1" and (about.low, about.high) == (0.0, 1.0)
-        if is_share and names[1] not in REGISTRY[names[0]].sizes:
+    for path, (_, value) in declared(chosen.machine).items():
+        named = path.startswith(tuple(f"effects.{effect}." for effect in chosen.effects))
+        if named and path not in fitted and is_share(path):
             other = free_run_score(chosen.fixed(path, 1.0 - value), evidence, seen=0.0)
             if other < score + STRONG:
                 found.add(path)

@@ -58,15 +58,11 @@ class Unknown:
     @property
     def is_share(self) -> bool:
         """Tell whether it is a share, of which none and all are as likely as any other."""
-        low, high = self.value(self.low), self.value(self.high)
-        return self.unit == "1" and abs(low) < END and abs(high - 1.0) < END
+        return is_share(self.path)
 
     @property
     def _field(self) -> tuple[type[Effect], str] | None:
-        """The effect of the registry whose field it is, and the field's name; a curve has none."""
-        group, *names = self.path.split(".")
-        known = group == "effects" and names[0] in REGISTRY
-        return (REGISTRY[names[0]], names[1]) if known else None
+        return _effect_field(self.path)
 
     @property
     def is_stepwise(self) -> bool:
@@ -86,6 +82,22 @@ class Unknown:
         led = abs(x - self.start) > END
         least = x - self.low < END and abs(self.value(self.low)) > ROUNDING * abs(self.scale)
         return led and not self.is_share and (least or self.high - x < END)
+
+
+def is_share(path: str) -> bool:
+    """Tell whether a parameter, by dotted path, shapes an effect and runs from none to all."""
+    field = _effect_field(path)
+    if field is None or field[1] in field[0].sizes:
+        return False
+    about = quantities(field[0])[field[1]]
+    return about.unit == "1" and (about.low, about.high) == (0.0, 1.0)
+
+
+def _effect_field(path: str) -> tuple[type[Effect], str] | None:
+    """Return the effect of the registry whose field it is, and its name; a curve has none."""
+    group, *names = path.split(".")
+    known = group == "effects" and names[0] in REGISTRY
+    return (REGISTRY[names[0]], names[1]) if known else None
 
 
 @dataclass(frozen=True)

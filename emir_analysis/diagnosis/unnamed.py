@@ -18,6 +18,7 @@ from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import (
     ACCURACY,
     GROWING,
+    HOPELESS,
     Trial,
     fit_balances,
     free_run_problem,
@@ -111,7 +112,8 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """Return a trial fitted to the free run of the recordings, first of their beginning.
 
     That is left out where the balances' curve explains the whole. What the free run tells less
-    than they do stays as they say.
+    than they do stays as they say. A curve that does not come near even the beginning stays as
+    fitted to that.
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
@@ -120,6 +122,8 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
         problem = free_run_problem(trial, evidence, x, share)
         solution = fit(_smoothly(problem, trial, begin), ACCURACY)
         x, trial = solution.x, trial.continued(solution)
+        if solution.misfit > HOPELESS:
+            break
     return trial
 
 

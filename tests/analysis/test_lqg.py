@@ -105,6 +105,25 @@ def test_a_missing_number_shuts_the_valve_and_is_forgotten(inputs: LqgInputs) ->
         assert math.isfinite(again.wanted)
 
 
+def test_a_first_reading_that_is_no_number_shuts_the_valve_and_is_forgotten(
+    inputs: LqgInputs,
+) -> None:
+    """Neither driving nor standing by begins with it."""
+    control = LqgControl(Lqg(lqg_parameters(joint1())))
+    move = inputs.move._asdict().items()
+    read = {f"move_{name}": value for name, value in move}
+    read |= {"reference_stroke": inputs.reference} | inputs._asdict()
+    begun = control.step(None, read, 0.032)
+    for name in ("reference_stroke", "pressure_lifting", "deflection"):
+        missing = read | {name: math.nan}
+        state, signals = control.step(None, missing, 0.032)
+        assert signals["valve_command"] == 0.0
+        assert control.step(state, read, 0.032)[1] == begun[1]
+        state, signals = control.stand_by(None, missing)
+        assert signals["lqg_ready"] == 0.0
+        assert control.stand_by(state, read)[1] == control.stand_by(None, read)[1]
+
+
 def test_mpc_without_its_solver_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mpc, "find_spec", dict[str, None]().get)
     with pytest.raises(ParameterError, match=r"needs OSQP: pip install 'emir_ros\[mpc\]'"):

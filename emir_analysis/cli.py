@@ -59,13 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "blind": _blind,
         "bench": _bench,
     }
-    if not words or words[0] in ("-h", "--help"):
-        print(USAGE)
-        return 0
-    if words[0] not in commands:
+    if words and words[0] not in (*commands, "-h", "--help"):
         return _complain("emir", f"{words[0]!r}: the commands are {', '.join(commands)}")
     try:
-        return commands[words[0]](words[1:])
+        code = commands.get(words[0], _usage)(words[1:]) if words else _usage([])
+        sys.stdout.flush()  # here, not when Python ends, where nothing can be caught
     except (InputError, ParameterError) as error:
         return _complain(f"emir {words[0]}", str(error))
     except BrokenPipeError:  # whoever read our output has seen enough
@@ -73,6 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
+    return code
+
+
+def _usage(_: Sequence[str]) -> int:
+    print(USAGE)
+    return 0
 
 
 def _complain(who: str, message: str) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from matplotlib.backend_bases import FigureCanvasBase
 
 from emir_analysis.errors import InputError
+from emir_common.quantity import ParameterError
 
 
 def check_outputs(
@@ -55,8 +56,8 @@ def write_all(
         try:
             if path is not None:
                 write(path)
-        except InputError as error:
-            failed.append(error)
+        except (InputError, ParameterError) as error:
+            failed.append(InputError(str(error)))
     return failed
 
 

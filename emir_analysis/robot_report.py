@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from emir_analysis.report import Block, Picture, Plot
 from emir_analysis.robot_metrics import joint_error, path_error, tcp_error
@@ -11,8 +10,6 @@ from emir_analysis.robot_picture import path_picture
 from emir_analysis.run_plots import Line, Row, plot
 from emir_analysis.signals import Recording, Signal
 from emir_msgs_py.robot_topics import JOINTS
-
-Array = NDArray[np.float64]
 
 DASHES = ("solid", "dash", "dot")
 DEGREES = float(np.degrees(1.0))

@@ -121,7 +121,8 @@ class Rosbag2Writer:
 
     compression: of the chunks in the files, a key of COMPRESSIONS. max_size (bytes) and
     max_duration (s, of log time): a new file is begun where the present one reaches them.
-    The folder must not exist: a recording is never written over. Raises ParameterError then.
+    The folder has to be new or empty: a recording is never written over. Raises ParameterError
+    where it is not, or cannot be written to.
     """
 
     folder: Path
@@ -141,14 +142,18 @@ class Rosbag2Writer:
             raise ParameterError(
                 f"compression {self.compression!r}: there are {', '.join(COMPRESSIONS)}"
             )
+        self._splits = min(self.max_size, self.max_duration) < math.inf
         try:
-            self.folder.mkdir(parents=True)
-        except FileExistsError:
-            raise ParameterError(f"{self.folder}: exists already, and is not overwritten") from None
+            self.folder.mkdir(parents=True, exist_ok=True)
+            taken = any(self.folder.iterdir())
+            if not taken:
+                self._file = self._next_file()
+        except FileExistsError:  # a file of that name
+            taken = True
         except OSError as error:
             raise ParameterError(f"{self.folder}: {error.strerror}") from None
-        self._splits = min(self.max_size, self.max_duration) < math.inf
-        self._file = self._next_file()
+        if taken:
+            raise ParameterError(f"{self.folder}: exists already, and is not overwritten")
 
     def __enter__(self) -> Self:
         return self

@@ -16,8 +16,6 @@ from emir_common.quantity import ParameterError
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.81  # m/s^2
-
 
 @dataclass(frozen=True, eq=False)
 class Boom:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from emir_analysis.blind.hidden import CATALOGUE, Hidden, Random
-from emir_analysis.blind.machine import Array, Machine, Sizes
+from emir_analysis.blind.machine import Array, Machine, NotSolvedError, Sizes
 from emir_analysis.blind.numbers import Numbers, Stated
 from emir_analysis.blind.operator import Operator
 from emir_analysis.blind.recording import SEEN_IN, Run, Start, operated, repeated, spread_of_strokes
@@ -17,6 +17,7 @@ Effects = tuple[type[Hidden], ...]
 MATTERS = 0.05  # of a signal's standard deviation: the least RMS that effects have to make
 STRONGER = 1.6  # times, where they make less
 ATTEMPTS = 4  # to make them matter, before others are drawn
+DRAWS = 30  # of effects, where those before do not matter
 PROBE = 25.0  # s of a run, over which it is found out whether they do
 
 
@@ -47,16 +48,20 @@ def puzzle(  # noqa: PLR0913, PLR0917 (what a machine is made of, one by one)
     """Build machine `number` of a seed and let it move for twice `duration`, s.
 
     foreign: what no catalogue holds; without any, no machine has it. only: effects from which to
-    draw, all when empty. Equal arguments give equal machines.
+    draw, all when empty. Equal arguments give equal machines. Raises NotSolvedError where nothing
+    that is drawn makes a difference.
     """
     random = np.random.default_rng((seed, number))
     numbers = stated.built(random)
     start = Start(random.uniform(0.7, 0.87), random.uniform(15e5, 35e5))
-    machine, size, tried = None, 0.0, 0
-    while machine is None:
+    machine, size = None, 0.0
+    for tried in range(DRAWS):
         effects = hidden_in(seed, number, CATALOGUE, foreign, only, tried)
         machine, size = _that_matters(effects, numbers, start, stated, random)
-        tried += 1
+        if machine is not None:
+            break
+    else:
+        raise NotSolvedError(f"nothing of {DRAWS} draws makes a difference")
     runs = [
         operated(machine, start, _operator(random, stated, abrupt=abrupt), duration)
         for abrupt in (False, True)

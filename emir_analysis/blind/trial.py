@@ -68,18 +68,22 @@ def _trial(plan: Plan, number: int, threads: int, folder: Path) -> Outcome:
 def _diagnosed(folder: Path, threads: int) -> tuple[dict[str, Any], str]:
     """Return the answer of `emir diagnose`, or why there is none."""
     answer = folder / "answer.json"
-    result = subprocess.run(  # noqa: S603 (the project's own command)
-        [
-            *(sys.executable, "-m", "emir_analysis.cli", "diagnose", str(folder / LEARN)),
-            *("--datasheet", str(folder / SHEET), "--signals", str(folder / SIGNALS)),
-            *("--judge", str(folder / JUDGE), "--json", str(answer)),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE,
-        env=os.environ | {"NUMBA_NUM_THREADS": str(threads), "OMP_NUM_THREADS": str(threads)},
-    )
+    command = [
+        *(sys.executable, "-m", "emir_analysis.cli", "diagnose", str(folder / LEARN)),
+        *("--datasheet", str(folder / SHEET), "--signals", str(folder / SIGNALS)),
+        *("--judge", str(folder / JUDGE), "--json", str(answer)),
+    ]
+    try:
+        result = subprocess.run(  # noqa: S603 (the project's own command)
+            command,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE,
+            env=os.environ | {"NUMBA_NUM_THREADS": str(threads), "OMP_NUM_THREADS": str(threads)},
+        )
+    except subprocess.TimeoutExpired:
+        return {}, f"no answer within {PATIENCE:g} s"
     if result.returncode != 0:
         last = (result.stderr.strip().splitlines() or ["no word"])[-1]
         return {}, f"exit code {result.returncode}: {last}"

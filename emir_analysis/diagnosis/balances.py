@@ -12,6 +12,7 @@ bending          measured minus modelled tip deflection under the measured force
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
-from emir_plant.effects import terms
+from emir_plant.effects import Effects, terms
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import resolver
@@ -167,30 +168,29 @@ class Balances:
         What they truly were if the sensors distort them as the machine's effects say.
         """
         effects = machine.effects
-        late = effects.sensor_delay
-        columns, smooth = [], [self._smooth_angle, self._rate]
-        for k, name in enumerate(("angle", H, S, "deflection")):
-            dead = late.dead_share * getattr(late, name)
-            lag = getattr(late, name) - dead
-            bias, gain = getattr(effects.sensor_bias, name), getattr(effects.sensor_gain, name)
-            column = self._shown[:, k]
-            if lag > 0.0:
-                column = column + lag * self._slopes[:, k]
-            columns.append((self._ahead(column, dead) - bias) / (1.0 + gain))
-            if k == 0:
-                if lag > 0.0:
-                    smooth[0] = smooth[0] + lag * self._rate
-                    smooth[1] = smooth[1] + lag * np.gradient(self._rate, self._experiment.period)
-                smooth = [self._ahead(signal, dead) for signal in smooth]
-                smooth = [(smooth[0] - bias) / (1.0 + gain), smooth[1] / (1.0 + gain)]
-        return np.column_stack([*columns, *smooth])
+        angle = self._undelayed(effects, "angle", self._smooth_angle, self._rate)
+        bend = np.gradient(self._rate, self._experiment.period)
+        rate = self._undelayed(effects, "angle", self._rate, bend)
+        columns = [
+            _unscaled(effects, name, self._undelayed(effects, name, shown, slope))
+            for name, shown, slope in zip(
+                ("angle", H, S, "deflection"), self._shown.T, self._slopes.T, strict=True
+            )
+        ]
+        angle = _unscaled(effects, "angle", angle)
+        return np.column_stack([*columns, angle, rate / (1.0 + effects.sensor_gain.angle)])
 
-    def _ahead(self, signal: Array, dead: float) -> Array:
-        """Return a signal, (n,), a dead time, s, earlier than it was shown."""
+    def _undelayed(self, effects: Effects, sensor: str, signal: Array, slope: Array) -> Array:
+        """Return a sensor's signal, (n,), without its lag and dead time. slope: (n,) 1/s of it."""
+        late = effects.sensor_delay
+        dead = late.dead_share * getattr(late, sensor)
+        lag = getattr(late, sensor) - dead
+        if lag > 0.0:
+            signal = signal + lag * slope
         if dead == 0.0:
             return signal
         time = self._experiment.time
-        return np.interp(time + dead, time, signal)
+        return np.asarray(np.interp(time + dead, time, signal))
 
     def _modelled(
         self, plants: Sequence[Plant], true: Array, angle: int = READ
@@ -234,13 +234,12 @@ class Balances:
         if not machine.sensors.own_stroke:
             return shown
         effects = machine.effects
-        late = effects.sensor_delay
-        dead = late.dead_share * late.stroke
-        if late.stroke > dead:
-            slope = _smoothed(shown, LAG_SMOOTHING, self._experiment.period)[1]
-            shown = shown + (late.stroke - dead) * slope
-        undelayed = self._ahead(shown, dead)
-        return (undelayed - effects.sensor_bias.stroke) / (1.0 + effects.sensor_gain.stroke)
+        undelayed = self._undelayed(effects, "stroke", shown, self._stroke_slope)
+        return _unscaled(effects, "stroke", undelayed)
+
+    @cached_property
+    def _stroke_slope(self) -> Array:
+        return _smoothed(self._experiment.outputs[:, 0], LAG_SMOOTHING, self._experiment.period)[1]
 
     def _missing(self, modelled: Modelled, true: Array, off: Array) -> Array:
         """Return what is missing in each balance; off: stroke beyond the machine's, (n,) m."""
@@ -274,6 +273,12 @@ def level(residual: Array) -> Array:
 def available(measured: frozenset[str]) -> NDArray[np.bool_]:
     """Tell which of BALANCES the measured signals allow, (5,)."""
     return np.array([balance.signals <= measured for balance in BALANCES.values()])
+
+
+def _unscaled(effects: Effects, sensor: str, signal: Array) -> Array:
+    """Return a sensor's signal, (n,), without its bias and gain."""
+    bias = getattr(effects.sensor_bias, sensor)
+    return np.asarray((signal - bias) / (1.0 + getattr(effects.sensor_gain, sensor)))
 
 
 def _smoothed(signal: Array, length: float, period: float) -> tuple[Array, Array]:

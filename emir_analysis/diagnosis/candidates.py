@@ -29,9 +29,11 @@ SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
 ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
 FINE_ACCURACY = 1e-5  # the same of the last fit: flat directions still matter on another recording
 ROUGH = 3e-2  # the same where only the way to the optimum is wanted
+CLOSE = 2.0  # RMS error in units of the noise beyond which flat directions do not matter yet
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
 BEHIND = 1.5  # times the error of what a trial has to beat: further off, a fine fit changes nothing
+GLIMPSE = 8  # evaluations of a fit that may lead nowhere
 GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted before the whole
 SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
@@ -234,21 +236,32 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     """Fit a trial that was fitted to a part of the recordings' free run to the whole.
 
     In the end with slopes of the free run itself, over short steps: near the optimum the coarse
-    ones point a little beside it. Where no sensor tells p_S, the middle of what it may be at rest
-    is too far off to begin at. A hopeless trial is not polished, nor one far behind its rival.
+    ones point a little beside it. A hopeless trial is not polished, nor one far behind its rival.
     """
-    rest = [
-        np.zeros(2) if Starts(e, evidence).is_told else settled(known.machine, e, evidence)
-        for e in evidence.experiments
-    ]
-    x = np.concatenate([known.x, *rest])
-    problem = free_run_problem(known, evidence, x)
+    problem = _whole_problem(known, evidence)
     near = fit(problem, ACCURACY)
     behind = math.inf if rival is None else BEHIND * math.sqrt(mean_square(rival, evidence))
     if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
-    return known.continued(fit(fine, FINE_ACCURACY))
+    return known.continued(fit(fine, FINE_ACCURACY if near.misfit <= CLOSE else ACCURACY))
+
+
+def glimpsed(known: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial to the free run of the whole for so long as tells whether that leads anywhere."""
+    return known.continued(fit(_whole_problem(known, evidence), ACCURACY, evaluations=GLIMPSE))
+
+
+def _whole_problem(known: Trial, evidence: Evidence) -> Problem:
+    """Return the free run of whole recordings as a problem, begun where a trial is at rest.
+
+    Where no sensor tells p_S, the middle of what it may be at rest is too far off to begin at.
+    """
+    rest = [
+        np.zeros(2) if Starts(e, evidence).is_told else settled(known.machine, e, evidence)
+        for e in evidence.experiments
+    ]
+    return free_run_problem(known, evidence, np.concatenate([known.x, *rest]))
 
 
 def with_all_terms(known: Trial, effect: str, sheet: Sheet) -> Trial:

@@ -73,7 +73,7 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     control = None
     if model_out is not None:
         progress("designing a controller before and after")
-        control = before_and_after(findings.sheet.machine, findings.chosen.machine)
+        control = before_and_after(findings.sheet.machine, findings.chosen.machine, progress)
     result = diagnosis(findings, judgement, control)
     failed += write_all(
         [

@@ -6,6 +6,7 @@ import numpy as np
 
 from emir_analysis.compare import dynamic_deflection, figures, run
 from emir_analysis.design_pfc import DesignTask, design_pfc
+from emir_analysis.diagnosis.whole import Progress
 from emir_analysis.node_controls import PfcControl
 from emir_common.quantity import ParameterError
 from emir_control.pfc import Pfc
@@ -27,17 +28,19 @@ class ControlResult:
     tcp: float
 
 
-def before_and_after(stated: Machine, found: Machine) -> dict[str, ControlResult]:
+def before_and_after(
+    stated: Machine, found: Machine, progress: Progress
+) -> dict[str, ControlResult]:
     """Return the errors of controllers designed for either machine, both on the found one.
 
-    A design that cannot be made or run is left out.
+    A design that cannot be made or run is left out, and said so.
     """
     results = {}
     for name, machine in (("before", stated), ("after", found)):
         try:
             results[name] = _on(found, machine)
-        except (ParameterError, SimulationError):
-            continue
+        except (ParameterError, SimulationError) as error:
+            progress(f"no controller designed {name}: {error}")
     return results
 
 

@@ -63,28 +63,19 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     search = Search(evidence, sheet, progress)
     best = search.run()
     chosen, refitted = best[0], search.refitted
-    final = search.whole.plainer(search.whole.fitted(chosen)) if chosen.effects else refitted
-    machines = [sheet.machine, search.balanced.machine]
-    before, unaided = evidence.residuals(machines)
-    after = unaided
-    if final.effects:
+    before, unaided = evidence.residuals([sheet.machine, search.balanced.machine])
+    final, after = refitted, unaided
+    if chosen.effects:
+        final = search.whole.plainer(search.whole.fitted(chosen))
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
-    good = quiet(level(after), limits(final.machine, evidence))
-    good = good and explained(final, evidence)
-    verdict = _verdict(final, len(best) - 1, convincing=good)
+    verdict = _verdict(final, after, evidence, rivals=len(best) - 1)
+    curves, with_curve = Curves(search.balanced, evidence, search.floor), None
+    if verdict == "found" and not at_noise(final, evidence):
+        verdict, with_curve = _doubted(final, curves, progress)
+    rejected = None
     if verdict == "nothing_missing":
         refitted = final = search.whole.fitted(final)
-    with_curve, curves = None, Curves(search.balanced, evidence, search.floor)
-    if verdict == "found" and not at_noise(final, evidence):
-        if sticks(final):
-            progress("asking whether its friction differs with the direction")
-            verdict = "unexplained" if curves.uneven(final) else verdict
-        else:
-            progress("asking whether a curve says it better")
-            with_curve = curves.measured_instead(final)
-            verdict = "unexplained" if with_curve is not None else verdict
-    rejected = None
-    if verdict == "unexplained":
+    elif verdict == "unexplained":
         rejected = final if final.effects else None
         final, after = refitted, unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
@@ -114,6 +105,16 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     )
 
 
+def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Trial | None]:
+    """Return the verdict on effects that leave something, and the curve that says it better."""
+    if sticks(named):
+        progress("asking whether its friction differs with the direction")
+        return "unexplained" if curves.uneven(named) else "found", None
+    progress("asking whether a curve says it better")
+    instead = curves.measured_instead(named)
+    return "found" if instead is None else "unexplained", instead
+
+
 def _measured(
     curves: Curves, closest: Trial, search: Search, evidence: Evidence, progress: Progress
 ) -> Trial | None:
@@ -126,12 +127,13 @@ def _measured(
     return found
 
 
-def _verdict(final: Trial, rival_count: int, *, convincing: bool) -> str:
-    if not convincing:
+def _verdict(final: Trial, after: Array, evidence: Evidence, *, rivals: int) -> str:
+    """Return the verdict on a trial that leaves residuals, (w, 5), with so many as good as it."""
+    if not quiet(level(after), limits(final.machine, evidence)) or not explained(final, evidence):
         return "unexplained"
     if not final.effects:
         return "nothing_missing"
-    return "ambiguous" if rival_count else "found"
+    return "ambiguous" if rivals else "found"
 
 
 def loudest(residual: Array, floor: Array, limit: Array) -> str | None:

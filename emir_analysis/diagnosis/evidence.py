@@ -73,6 +73,14 @@ class Evidence:
             offset += float(experiment.time[-1])
         return np.concatenate(parts)
 
+    def place(self, time: float) -> tuple[str, float]:
+        """Return of which recording a time of `time` is, s, and which time of it."""
+        for experiment in self.experiments[:-1]:
+            if time <= experiment.time[-1]:
+                return experiment.name, time
+            time -= float(experiment.time[-1])
+        return self.experiments[-1].name, time
+
     def duration(self, share: float) -> float:
         """Return the length of a share of all recordings, s."""
         return share * sum(float(e.time[-1]) for e in self.experiments)

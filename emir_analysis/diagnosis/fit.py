@@ -22,7 +22,7 @@ FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
 BEYOND = 1e12  # times the noise: a run that is further off is out of all bounds
 TOLD = 1.0 + 1e-6  # times the curvature of what holds a parameter: more and the data tell of it
 KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
-EVALUATIONS = 20  # of the model in one fit, beside those for the Jacobian
+EVALUATIONS = 20  # of the model in one fit, beside those for the slopes
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,14 @@ class Solution:
         return random.multivariate_normal(self.x, told, count, method="eigh")
 
 
-def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
+def fit(
+    problem: Problem, accuracy: float, *, robust: bool = False, evaluations: int = EVALUATIONS
+) -> Solution:
     """Minimise the squared residuals of a problem inside its bounds.
 
     accuracy: relative, of the cost. robust: residuals far above the noise count by their
-    size, not by its square. A start that cannot be simulated is returned with an infinite misfit.
+    size, not by its square. evaluations: of the model at most, beside those for slopes.
+    A start that cannot be simulated is returned with an infinite misfit.
     """
     low, high = problem.low, problem.high
     margin = 1e-6 * np.minimum(high - low, 1.0)
@@ -104,7 +107,7 @@ def fit(problem: Problem, accuracy: float, *, robust: bool = False) -> Solution:
         loss="soft_l1" if robust else "linear",
         xtol=LEAST_STEP,
         ftol=accuracy,
-        max_nfev=EVALUATIONS,
+        max_nfev=evaluations,
     )
     slopes = np.asarray(result.jac)
     return Solution(
@@ -156,6 +159,11 @@ def descended(problem: Problem, accuracy: float) -> Solution:
     return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost), slopes.T @ slopes)
 
 
+def steps_inside(x: Array, step: float, high: Array) -> Array:
+    """Return the steps of finite differences, (k,): back where one ahead leaves the bounds."""
+    return np.where(x + step > high, -step, step)
+
+
 def _corrected(slopes: Array, step: Array, unforeseen: Array) -> Array:
     """Return slopes, (n, k), changed the least that explains what they missed, (n,), in a step."""
     along = slopes.T @ (slopes @ step)
@@ -193,7 +201,7 @@ class _Held:
     def slopes(self, x: Array) -> tuple[Array, Array]:
         """Return the residuals, (n + k,), at x, (k,), and their slopes, (n + k, k)."""
         problem = self._problem
-        steps = np.where(x + problem.step > problem.high, -problem.step, problem.step)
+        steps = steps_inside(x, problem.step, problem.high)
         values = (problem.coarse or problem.model)(np.vstack([x, x + np.diag(steps)]))
         slopes = (values[1:] - values[0]) / steps[:, None]
         # a neighbour that cannot be simulated says nothing about the slope

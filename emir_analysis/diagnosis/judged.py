@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis import black_box
-from emir_analysis.diagnosis.candidates import fit_balances, fit_free_run, free_run
+from emir_analysis.diagnosis.candidates import (
+    fit_balances,
+    fit_free_run,
+    free_run,
+    free_run_errors,
+)
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -80,6 +85,8 @@ def _reconciled(findings: Findings, judge: Evidence) -> bool:
 
     What was fitted may have left some of them open, or have known them from next to nothing.
     """
+    if not np.all(np.isfinite(np.concatenate(free_run_errors(findings.chosen.machine, judge)))):
+        return False  # it cannot even rest there
     experiments = [*findings.evidence.experiments, *judge.experiments]
     both = Evidence(experiments, findings.sheet.machine)
     balanced = fit_balances(findings.chosen, both, both.floor(findings.chosen.machine))

@@ -24,7 +24,7 @@ from emir_analysis.diagnosis.candidates import (
     trial,
 )
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit
+from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit, steps_inside
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
@@ -74,7 +74,7 @@ class _Left:
         low, high = (bound[free] for bound in known.unknowns.bounds)
         self._known, self._free = known.x, free
         self._bounds, self._room = (low, high), (low - x, high - x)
-        steps = np.where(x + step > high, -step, step)
+        steps = steps_inside(x, step, high)
         neighbours = known.x + steps[:, None] * np.eye(free.size)[free]
         values = missing([known, *map(known.at, neighbours)])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
@@ -123,7 +123,7 @@ class _Candidate:
         self.x, self.at_best = self._best(starts)
         for unit in self._steps():
             self.x, self.at_best = self._best([self.x + s * unit for s in FINER])
-        steps = np.where(self.x + left.step_size > high, -left.step_size, left.step_size)
+        steps = steps_inside(self.x, left.step_size, high)
         self.slopes = (self._inside(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
         change, self.expected = _least(self.at_best, self.slopes, low - self.x, high - self.x)
         self._reached = self.x + change

@@ -171,7 +171,10 @@ def _when(lies: Where, findings: Findings) -> str:
     """Return the stretch of time that holds most of what is left, where that is short."""
     if lies.end - lies.begin > SHORT * findings.evidence.duration(1.0):
         return ""
-    return f" ({100 * MOST:.0f} % of it from {lies.begin:.1f} to {lies.end:.1f} s)"
+    (first, begin), (last, end) = map(findings.evidence.place, (lies.begin, lies.end))
+    if len(findings.evidence.experiments) == 1:
+        return f" ({100 * MOST:.0f} % of it from {begin:.1f} to {end:.1f} s)"
+    return f" ({100 * MOST:.0f} % of it from {begin:.1f} s of {first} to {end:.1f} s of {last})"
 
 
 def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:

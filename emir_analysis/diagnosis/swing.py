@@ -19,6 +19,7 @@ from emir_analysis.signals import Array
 
 BINS = 5  # of a signal: each has three unknowns
 STEPS = 10  # frequencies in the width of a line, one over the recording's length
+AT_ONCE = 100  # frequencies: all of a long recording would need memory by its length's square
 HIGHEST = 1.5  # Hz; the balances' windows of half a second show little of what swings faster
 DOUBT = 1.0  # windows of no residual that each bin is taken to have seen besides
 TAKEN = 0.7  # least part of what no static function predicts that a swing has to
@@ -63,16 +64,18 @@ def best_swing(residual: Array, time: Array, predictors: dict[str, tuple[str, Ar
     length = float(time[-1] - time[0])
     frequencies = np.arange(1.0, HIGHEST * length, 1.0 / STEPS) / length
     signals = {"": ("1", np.zeros_like(time))} | predictors
-    basis = _basis(frequencies, time)
-    shares = {
-        name: _shares(residual, basis, _bins(values)) for name, (_, values) in signals.items()
-    }
+    found: dict[str, list[Array]] = {name: [] for name in signals}
+    for some in np.array_split(frequencies, frequencies.size // AT_ONCE + 1):
+        basis = _basis(some, time)
+        for name, (_, values) in signals.items():
+            found[name].append(_shares(residual, basis, _bins(values)))
+    shares = {name: np.concatenate(parts) for name, parts in found.items()}
     most = max(float(share.max()) for share in shares.values())
     name = next(name for name, share in shares.items() if share.max() > most - ALIKE)
     at = int(np.argmax(shares[name]))
     unit, values = signals[name]
     bins = _bins(values)
-    sizes = _fitted(residual, basis[:, :, at : at + 1], bins)[:, 0]
+    sizes = _fitted(residual, _basis(frequencies[[at]], time), bins)[:, 0]
     table = tuple(
         (float(values[bins == k].mean()), float(a), float(np.hypot(b, c)))
         for k, (a, b, c) in enumerate(sizes)

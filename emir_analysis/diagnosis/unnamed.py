@@ -25,7 +25,7 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit
+from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit, steps_inside
 from emir_analysis.diagnosis.select import EXPLAINED, STRONG, excess, free_run_score, score
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
@@ -172,7 +172,7 @@ class _Balances:
 
     def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
         self._known, self._evidence, self._floor = known, evidence, floor
-        steps = np.where(known.x + STEP > known.unknowns.bounds[1], -STEP, STEP)
+        steps = steps_inside(known.x, STEP, known.unknowns.bounds[1])
         moved = map(known.unknowns.at, known.x + np.diag(steps))
         left = evidence.residuals([known.machine, *moved])
         self._rms = dict(zip(BALANCES, np.sqrt(np.mean(left[0] ** 2, axis=0)), strict=True))

@@ -20,6 +20,8 @@ TIGHT = 2.0  # times as many windows as the largest ones that make up as much, a
 class Where:
     """The shortest stretch of time with most of a residual, s, and the level beyond which it lies.
 
+    Of several recordings the time is counted on from one to the next.
+
     side: "above" or "below" the level of the signal, in its unit; all None without one.
     """
 

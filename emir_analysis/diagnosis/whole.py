@@ -9,6 +9,7 @@ from emir_analysis.diagnosis.candidates import (
     HOPELESS,
     Trial,
     free_run_errors,
+    glimpsed,
     mean_square,
     moved,
     refine_free_run,
@@ -118,8 +119,9 @@ class Whole:
             for end in (unknown.low, unknown.high) if unknown.is_share else ():
                 begun = fitted.at(moved(fitted.x, [k], [end]))
                 if self._excess(fitted) > LEFT**2 - 1.0 and self.score(begun) != self.score(fitted):
-                    again = refine_free_run(begun, self._evidence, fitted)
-                    fitted = min(fitted, again, key=self.score)
+                    begun = glimpsed(begun, self._evidence)
+                    if self.score(begun) < self.score(fitted):
+                        fitted = refine_free_run(begun, self._evidence)
         return fitted
 
     def _with_simple_shares(self, fitted: Trial) -> Trial:

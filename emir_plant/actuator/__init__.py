@@ -7,7 +7,7 @@ See docs/actuator.md.
 """
 
 from emir_plant.actuator.effects import REGISTRY
-from emir_plant.actuator.model import rates, simulate
+from emir_plant.actuator.model import simulate
 from emir_plant.actuator.parameters import Actuator
 from emir_plant.actuator.sheet import ActuatorSheet, is_actuator, load_actuator, write_actuator
 
@@ -17,7 +17,6 @@ __all__ = [
     "ActuatorSheet",
     "is_actuator",
     "load_actuator",
-    "rates",
     "simulate",
     "write_actuator",
 ]

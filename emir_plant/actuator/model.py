@@ -19,7 +19,7 @@ The state has the time, too, and what the spool drags behind play, which is move
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,13 +44,6 @@ USUAL = 3.0  # pressure that signals of the order of one hardly exceed
 APPROACHED = 3  # times, the speed of a light piston that sticks
 MOST_STEPS = 40  # what is stiffer than these resolve is not simulated: so is no machine
 LAMINAR = 0.02  # relative drop below which the orifice's square root is made smooth
-
-
-class Rates(NamedTuple):
-    """Flow through the valve and what the state does, per time."""
-
-    flow: float
-    state: Array
 
 
 @cache
@@ -106,13 +99,6 @@ def driven(actuator: Actuator, command: Array, pressure: Array, period: float) -
 def way(actuator: Actuator, command: Array, pressure: Array, period: float) -> Array:
     """Return how far the piston has moved (n,) under the measured pressure (n,), as a volume."""
     return np.asarray(_run_each(record(actuator), command, pressure, period, 0.0)[0, :, 2])
-
-
-def rates(actuator: Actuator, state: Array, opening: float) -> Rates:
-    """Return the flow and the state's derivative (10,) at a spool command."""
-    slope = np.zeros(STATES)
-    flow = _slope(state, state[PRESSURE], opening, record(actuator)[0], slope)
-    return Rates(flow, slope)
 
 
 @compiled_in_place

@@ -32,6 +32,7 @@ class LinkageError(Effect):
     }
     is_series: ClassVar[bool] = True
 
+    # a steeper slope would promise the balances what soft hoses do
     scale: float = quantity("1", -0.5, 0.5, "relative error of r at h = 0", default=0.0)
     slope: float = quantity("1/m", -0.5, 0.5, "its growth with the stroke", default=0.0)
     curvature: float = quantity("1/m^2", -20.0, 20.0, "and with its square", default=0.0)

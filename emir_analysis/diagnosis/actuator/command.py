@@ -5,7 +5,12 @@ from pathlib import Path
 
 from emir_analysis.diagnosis.actuator.curves import measured
 from emir_analysis.diagnosis.actuator.page import write_page
-from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, open_record
+from emir_analysis.diagnosis.actuator.record import (
+    PRESSURE,
+    ActuatorRecord,
+    open_judge,
+    open_record,
+)
 from emir_analysis.diagnosis.actuator.result import (
     ActuatorDiagnosis,
     diagnosis,
@@ -41,7 +46,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     chosen; `bag` itself when not given. model_out: data sheet with the effects to write.
     predictions: folder for the simulated runs beside the measured. Raises InputError or
     ParameterError, one line each, for anything that cannot be used; IncompleteError, with the
-    result, where an output cannot be written.
+    result, where the judge recording or an output cannot.
     """
     check_outputs([json, html, model_out], predictions, [datasheet, signals, bag, judge])
     sheet = load_actuator(datasheet)
@@ -64,7 +69,10 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     judged = None
     if judge is not None:
         progress(f"judging on {judge}")
-        judged = open_record(judge, signal_map)
+        try:
+            judged = open_judge(judge, signal_map, record)
+        except InputError as error:
+            failed.append(InputError(f"{error}; what was found is judged on the same recording"))
     runs = judged_runs(machines, record, judged)
     shown = record if judged is None else judged
     result = diagnosis(sheet, found, record, judged, runs)

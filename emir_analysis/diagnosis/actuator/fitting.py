@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.fit import steps_inside
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
@@ -209,7 +210,7 @@ class _Surplus:
         return np.hstack([deviations, weight * self._errors(points)])
 
     def _jacobian(self, x: Array, rms: float) -> Array:
-        steps = np.where(x + STEP > self.high, -STEP, STEP)
+        steps = steps_inside(x, STEP, self.high)
         here, *moved = self._each_at(np.vstack([x, x + np.diag(steps)]), rms)
         return np.stack([(there - here) / s for there, s in zip(moved, steps, strict=True)], 1)
 

@@ -14,6 +14,7 @@ FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
 LARGEST_GAP = 1.5  # sampling periods
 AT_REST = 8  # samples from which on a machine may be seen to rest
 STEADY = 2.0  # times the noise: the most that a pressure at rest varies
+SAME_PERIOD = 1e-3  # relative, within which two recordings are sampled alike
 NOT_OF_ORDER_ONE = 50.0  # times one, or less by as much: effects have other sizes then
 SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
 
@@ -98,6 +99,20 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
     _check_scale(path, OPENING, float(np.abs(record.opening).max()))
     _check_scale(path, PRESSURE, float(np.std(record.pressure)))
     return record
+
+
+def open_judge(path: Path, signal_map: SignalMap, record: ActuatorRecord) -> ActuatorRecord:
+    """Load a recording to judge on. Raises InputError as `open_record`, and for another period.
+
+    A linear model of samples, which is shown beside, knows no other.
+    """
+    judge = open_record(path, signal_map)
+    if abs(judge.period / record.period - 1.0) > SAME_PERIOD:
+        raise InputError(
+            f"{path}: a sample every {judge.period:.4g}, {record.name} one every"
+            f" {record.period:.4g}; record both alike"
+        )
+    return judge
 
 
 def _check_scale(path: Path, name: str, size: float) -> None:

@@ -198,16 +198,16 @@ def summary(result: ActuatorDiagnosis) -> str:
         for name, p in effect.parameters.items():
             lines.append(parameter_line(f"{effect.name}.{name}", p, _unit(p.unit, result)))
     i, ahead = result.tests[PRESSURE].intervals, result.one_step[PRESSURE]
-    figures = "  " + ", ".join(f"{label} {getattr(s, n):.3f}" for n, label in LABELS.items())
+    figures = "  " + ", ".join(f"{label} {getattr(s, n):.3g}" for n, label in LABELS.items())
     lines += [
         "",
         f"free run of {PRESSURE} on {result.judged_on}, from {start}, by the valve opening alone",
         f"RMS error in units of the file (its spread {result.spread:.3g}, noise {s.noise:.2g}):",
         figures,
         "  95 % by block bootstrap: "
-        + ", ".join(f"{label} {i[n].low:.3f} ... {i[n].high:.3f}" for n, label in LABELS.items()),
+        + ", ".join(f"{label} {i[n].low:.3g} ... {i[n].high:.3g}" for n, label in LABELS.items()),
         "one sample ahead of the measured pressure:",
-        "  " + ", ".join(f"{label} {getattr(ahead, n):.3f}" for n, label in LABELS.items()),
+        "  " + ", ".join(f"{label} {getattr(ahead, n):.3g}" for n, label in LABELS.items()),
     ]
     return "\n".join(lines)
 

@@ -36,7 +36,7 @@ STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit sta
 # the same of a size that acts only beyond some value
 STEPS = tuple(float(s) for s in range(-24, 25) if s)
 FINER = tuple(s / 5.0 for s in range(-4, 5))  # steps about the best of these
-SMALL = 0.1  # trial sizes, at which the free run is near enough to the known one's
+SMALL = 0.1  # trial sizes, at which a machine is near enough to the known one
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
@@ -61,6 +61,7 @@ class _Left:
     """What a trial and an effect leave when parameters do their best, in units of the noise.
 
     missing: trials -> (m, n), what they leave with their own parameters. step: of its slopes.
+    nothing: (n,), what is left without an effect.
     """
 
     def __init__(self, known: Trial, missing: Missing, step: float) -> None:
@@ -79,6 +80,7 @@ class _Left:
         values = missing([known, *map(known.at, neighbours)])
         slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
         self._basis, self._triangle = np.linalg.qr(np.vstack([slopes.T, prior]))
+        self.nothing = self.inside([known])[0][0]
 
     def __call__(self, trials: list[Trial]) -> Array:
         """Return what is left, (m, n), for trials with the known x."""
@@ -123,6 +125,8 @@ class _Candidate:
         self.x, self.at_best = self._best(starts)
         for unit in self._steps():
             self.x, self.at_best = self._best([self.x + s * unit for s in FINER])
+        if _soft(self.at_best) > _soft(left.nothing):
+            self.x, self.at_best = self._best([self.x, self._smaller(self.x)])
         steps = steps_inside(self.x, left.step_size, high)
         self.slopes = (self._inside(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
         change, self.expected = _least(self.at_best, self.slopes, low - self.x, high - self.x)
@@ -134,6 +138,15 @@ class _Candidate:
         residuals = self._inside(points)
         best = int(np.argmin([_soft(row) for row in residuals]))
         return points[best], residuals[best]
+
+    def _smaller(self, x: Array) -> Array:
+        """Return fields, (k,), with smaller sizes.
+
+        What explains nothing alone may do so beside another, and slopes say so near the machine
+        that is known, not where it makes all worse.
+        """
+        sizes = self._sizes()[self._known :]
+        return np.where(sizes, SMALL * x, x)
 
     def _steps(self) -> list[Array]:
         """Return a step, (k,), of each field that is begun in steps."""
@@ -250,9 +263,8 @@ class OnBalances:
         other shares of them takes long, and fits to the free run do it.
         """
         known, left = self._known, self._left
-        nothing = left.inside([known])[0][0]
         pairs = sorted(
-            combinations(self._begun, 2), key=lambda pair: _expected(pair[0], pair[1], nothing)
+            combinations(self._begun, 2), key=lambda pair: _expected(pair[0], pair[1], left.nothing)
         )
         together = []
         for one, other in pairs[:MOST_FITTED]:

@@ -48,6 +48,7 @@ class Whole:
         self._evidence, self._sheet = evidence, sheet
         self._floor, self._progress = floor, progress
         self._known: dict[tuple[str, ...], Trial] = {}
+        self._with_fewest: set[tuple[str, ...]] = set()  # effects whose sizes are all needed
 
     def fitted(self, chosen: Trial) -> Trial:
         """Return a trial fitted to the free run of the whole recordings."""
@@ -88,6 +89,7 @@ class Whole:
         Beside another that explains nothing a size may not find its way.
         """
         best = full
+        self._with_fewest.add(full.effects)
         for effect in full.effects:
             if REGISTRY[effect].is_series:
                 best = self._with_terms_that_tell(best, effect)
@@ -166,7 +168,8 @@ class Whole:
         may lead to where neither is right, such as a negative compliance.
         """
         if not sticks(fitted):
-            fitted = self._with_fewer_sizes(fitted)
+            if fitted.effects not in self._with_fewest:
+                fitted = self._with_fewer_sizes(fitted)
         elif breakaway_may_be_none(fitted):
             plain = without_breakaway(fitted, self._sheet)
             smooth = refine_free_run(plain, self._evidence, fitted)

@@ -61,8 +61,8 @@ def pressure(opening: Array, flow: Flow) -> Array:
     return np.asarray(run.y[1])
 
 
-def write(bag: Path, opening: Array, oil: Array, begin: int = 0) -> None:
-    """Write both signals as Float64, one sample per second from `begin`, s."""
+def write(bag: Path, opening: Array, oil: Array, begin: int = 0, seconds: int = 1) -> None:
+    """Write both signals as Float64, a sample every `seconds` from `begin`, s."""
     store = get_typestore(Stores.ROS2_JAZZY)
     kind = "std_msgs/msg/Float64"
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -70,7 +70,7 @@ def write(bag: Path, opening: Array, oil: Array, begin: int = 0) -> None:
             connection = writer.add_connection(f"/actuator/{topic}", kind, typestore=store)
             for k, value in enumerate(values):
                 data = store.serialize_cdr(store.types[kind](float(value)), kind)
-                writer.write(connection, (begin + k) * 10**9, data)
+                writer.write(connection, (begin + k * seconds) * 10**9, data)
 
 
 def record(folder: Path, flow: Flow, samples: int = 600, cut: int = 320) -> tuple[Path, Path]:

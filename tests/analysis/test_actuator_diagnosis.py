@@ -16,6 +16,7 @@ from emir_analysis.cli import main
 from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
 from emir_analysis.diagnosis.actuator.fitting import fit, narrowed
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
+from emir_analysis.errors import IncompleteError
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
 from emir_common.parameter_tree import with_values
@@ -226,6 +227,24 @@ def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -
     expected = [unknown.deviation**2 for unknown in found.unknowns]
     assert np.diag(found.covariance)[1:] == pytest.approx(expected[1:])
     assert found.evidence == pytest.approx(without.evidence, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("samples", "seconds", "reason"),
+    [(50, 1, "record at least 200"), (300, 2, "a sample every 2,")],
+)
+def test_a_judge_of_no_use_does_not_lose_what_was_found(
+    folder: Path, samples: int, seconds: int, reason: str
+) -> None:
+    bag, _ = recorded.record(folder, _proportional)
+    opening = recorded.moves(samples, 3)
+    recorded.write(folder / "judge", opening, np.sin(opening), seconds=seconds)
+    with pytest.raises(IncompleteError, match=reason) as told:
+        _diagnose(folder, bag, folder / "judge")
+    assert isinstance(told.value.result, ActuatorDiagnosis)
+    assert told.value.result.verdict == "nothing_missing"
+    assert json.loads((folder / "found.json").read_text())["judged_on"] == str(bag)
+    assert (folder / "found.html").exists()
 
 
 @pytest.mark.parametrize(

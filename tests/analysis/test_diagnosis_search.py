@@ -280,6 +280,18 @@ def test_a_judge_recording_lacks_nothing_that_other_parameters_explain(
     assert (said in statement(off_there, judgement)) == reconciled
 
 
+def test_a_judge_recording_in_which_the_machine_cannot_rest_is_said_to_be_one() -> None:
+    """With 300 bar in the lowering chamber the pump does not hold the boom."""
+    _, sheet, evidence = search({})
+    found = diagnose(evidence.experiments, sheet, lambda _: None)
+    (experiment,) = evidence.experiments
+    full = experiment.outputs + np.array([0.0, 0.0, 3e7, 0.0])
+    judgement = judged(found, [experiment.showing(experiment.angle, full)])
+    assert not judgement.reconciled
+    assert verdict(found, judgement) == "unexplained"
+    assert "where it cannot even rest" in statement(found, judgement)
+
+
 def test_a_load_of_one_recording_may_not_be_another_s() -> None:
     _, sheet, evidence = search({})
     found = diagnose(evidence.experiments, sheet, lambda _: None)

@@ -8,6 +8,7 @@ import pytest
 from emir_analysis.cli import main
 from emir_analysis.errors import InputError
 from emir_analysis.outputs import check_outputs, check_picture, write_all
+from emir_common.quantity import ParameterError
 
 
 def test_what_can_be_written_passes(tmp_path: Path) -> None:
@@ -98,6 +99,13 @@ def test_one_output_that_fails_costs_no_other(tmp_path: Path) -> None:
     def full(file: Path) -> None:
         raise InputError(f"{file}: No space left on device")
 
-    failed = write_all([(tmp_path / "a", full), (None, full), (tmp_path / "b", Path.touch)])
-    assert [str(error) for error in failed] == [f"{tmp_path / 'a'}: No space left on device"]
-    assert (tmp_path / "b").exists()
+    def out_of_range(file: Path) -> None:
+        raise ParameterError(f"{file}: mass = -1 kg")
+
+    a, b, c = (tmp_path / name for name in "abc")
+    failed = write_all([(a, full), (None, full), (b, out_of_range), (c, Path.touch)])
+    assert [str(error) for error in failed] == [
+        f"{a}: No space left on device",
+        f"{b}: mass = -1 kg",
+    ]
+    assert c.exists()

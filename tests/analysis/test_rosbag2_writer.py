@@ -98,6 +98,19 @@ def test_an_unknown_compression_is_refused_before_anything_is_made(tmp_path: Pat
     assert not (tmp_path / "bag").exists()
 
 
+def test_an_empty_folder_is_taken_and_a_filled_one_is_not_written_over(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    with Rosbag2Writer(folder) as writer:
+        _write(writer, 1)
+    before = sorted(folder.iterdir())
+    with pytest.raises(ParameterError, match="exists already, and is not overwritten"):
+        Rosbag2Writer(folder)
+    with pytest.raises(ParameterError, match="exists already, and is not overwritten"):
+        Rosbag2Writer(before[0])  # a file of that name
+    assert sorted(folder.iterdir()) == before
+
+
 def test_what_was_flushed_outlives_the_process(tmp_path: Path) -> None:
     """Killed by SIGKILL right behind a flush: all is there, although no chunk was full."""
     script = (

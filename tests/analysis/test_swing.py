@@ -1,11 +1,13 @@
 """What swings with time is told from what any signal predicts, and from neither."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import lombscargle
 
 from emir_analysis.diagnosis.shape import best_shape
-from emir_analysis.diagnosis.swing import Swing, best_swing, by_swing, swing
+from emir_analysis.diagnosis.swing import HIGHEST, STEPS, Swing, best_swing, by_swing, swing
 from emir_analysis.signals import Array
 
 TIME = np.arange(0.5, 60.0, 0.25)  # s, as the balances' windows
@@ -57,6 +59,16 @@ def test_the_period_is_where_the_largest_line_of_a_periodogram_stands() -> None:
     frequencies = np.linspace(0.02, 1.5, 3000)
     line = frequencies[np.argmax(lombscargle(TIME, residual, 2.0 * np.pi * frequencies))]
     assert best_swing(residual, TIME, signals()).period == pytest.approx(1.0 / line, rel=0.01)
+
+
+def test_memory_grows_with_the_length_of_a_recording_and_not_its_square() -> None:
+    time = np.arange(0.5, 300.0, 0.25)
+    residual = np.sin(2.0 * np.pi * time / 3.3)
+    tracemalloc.start()
+    assert best_swing(residual, time, {}).period == pytest.approx(3.3, rel=0.01)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 0.2 * 9 * 8 * time.size * HIGHEST * STEPS * time[-1]  # all at once
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,6 +1,7 @@
 """The blind test itself: repeatable machines, nothing lost, figures that mean what they say."""
 
 import json
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -9,8 +10,11 @@ import pytest
 
 from emir_analysis.blind import campaign as campaigns
 from emir_analysis.blind import puzzle as puzzles
+from emir_analysis.blind import trial as trials
 from emir_analysis.blind.campaign import campaign, workers
+from emir_analysis.blind.family import Secret, family
 from emir_analysis.blind.hidden import CATALOGUE, Hidden
+from emir_analysis.blind.machine import NotSolvedError
 from emir_analysis.blind.numbers import (
     DATA_SHEET,
     SIGNAL_MAP,
@@ -81,6 +85,29 @@ def test_a_seed_gives_the_same_machine_and_its_effect_matters(
     for name, tolerance in stated.tolerances.items():
         factor = getattr(one.machine.n, name) / getattr(stated.numbers, name)
         assert abs(factor - 1.0) <= tolerance
+
+
+def test_a_machine_in_which_nothing_matters_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(puzzles, "_large_enough", lambda *_: (None, 0.0))
+    with pytest.raises(NotSolvedError, match="of 30 draws"):
+        puzzle(read_numbers(DATA_SHEET), 11, 0, (), 4.0)
+
+
+def test_a_diagnosis_that_does_not_end_is_an_outcome(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Of this machine alone: the campaign goes on, and knows it when it is continued."""
+
+    def endless(*_: object, timeout: float, **__: object) -> None:
+        raise subprocess.TimeoutExpired("emir diagnose", timeout)
+
+    secret = Secret("none", (), {}, 0.0)
+    boom = family(actuator=False)._replace(made=lambda *_: secret)
+    monkeypatch.setattr(trials, "family", lambda **_: boom)
+    monkeypatch.setattr(subprocess, "run", endless)
+    answered = trials.trial(Plan(1, 60.0, ""), 3, 1, tmp_path)
+    assert (answered.machine, answered.verdict) == (3, "failed")
+    assert "no answer within 3600 s" in answered.failure
 
 
 def test_a_varied_machine_is_another_one_that_works_as_well(

@@ -89,9 +89,18 @@ class Trial:
         return [self.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
 
     def with_a_term_less(self, effect: str) -> "Trial | None":
-        """Return the trial without the last size of an effect, if there are others before it."""
+        """Return the trial without the last size of an effect, if there are others before it.
+
+        What else is fitted is where it is most probable then, to first order.
+        """
         sizes = self._sizes(effect)
-        return self._less([f"effects.{effect}.{sizes[-1]}"]) if len(sizes) > 1 else None
+        if len(sizes) == 1:
+            return None
+        path = f"effects.{effect}.{sizes[-1]}"
+        last = [unknown.path for unknown in self.unknowns.members].index(path)
+        along = self.covariance[:, last] / self.covariance[last, last]
+        x = self.x - self.x[last] * np.where(np.isfinite(along), along, 0.0)
+        return self._less([path]).at(np.delete(np.clip(x, *self.unknowns.bounds), last))
 
     def _sizes(self, effect: str) -> list[str]:
         paths = [unknown.path for unknown in self.unknowns.members]

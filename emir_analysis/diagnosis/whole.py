@@ -122,7 +122,7 @@ class Whole:
                 begun = fitted.at(moved(fitted.x, [k], [end]))
                 if self._excess(fitted) > LEFT**2 - 1.0 and self.score(begun) != self.score(fitted):
                     begun = glimpsed(begun, self._evidence)
-                    if self.score(begun) < self.score(fitted):
+                    if self.score(begun) < self.score(fitted) - STRONG:
                         fitted = refine_free_run(begun, self._evidence)
         return fitted
 

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
+import yaml
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
@@ -98,9 +99,26 @@ def files(path: Path) -> list[Path]:
     if not path.exists():
         raise InputError(f"{path}: no such recording")
     found = [path] if path.is_file() else sorted(path.glob("*.mcap"), key=_place)
+    listed = _listed(path / "metadata.yaml")
+    other = next((name for name in listed if not name.endswith(".mcap")), None)
+    if other is not None and not found:
+        raise InputError(f"{path}: {other} is no .mcap file; `ros2 bag convert` makes one of it")
     if not found or found[0].suffix != ".mcap":
         raise InputError(f"{path}: not a recording: no .mcap file")
+    missing = [name for name in listed if not (path / name).exists()]
+    if missing:
+        raise InputError(f"{path}: {missing[0]}, which its metadata.yaml lists, is missing")
     return found
+
+
+def _listed(file: Path) -> list[str]:
+    """Return the names of a recording's files as its metadata.yaml has them; none without one."""
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [Path(name).name for name in names]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        return []  # the files say for themselves what is in them
 
 
 def _place(file: Path) -> tuple[int, str]:

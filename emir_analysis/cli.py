@@ -70,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
+        sys.stderr.write(f"emir {words[0]}: interrupted\n")
         return 130
     return code
 

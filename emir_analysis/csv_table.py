@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +14,15 @@ SEPARATORS = ",;\t"
 COMMENT = "#"
 
 
-def read_columns(file: Path, wanted: Iterable[str]) -> dict[str, Array]:
-    """Return the wanted columns by name, (n,) each.
+def read_columns(
+    file: Path, wanted: Iterable[str], sparse: Collection[str] = ()
+) -> dict[str, Array]:
+    """Return the wanted columns by name, (n,) each; NaN for a blank cell of a sparse one.
 
     The first line names the columns, behind comments (#); comma, semicolon or tab stand between.
     Where it is not a comma, a decimal comma is read, too. Columns that nobody wants may hold
     anything. Raises InputError, naming file, line and column, for a file that cannot be read, a
-    missing header or column, rows of different length, text, blanks and NaN.
+    missing header or column, rows of different length, text, blanks elsewhere and NaN.
     """
     rows, point = _rows(file)
     if not rows:
@@ -37,7 +39,11 @@ def read_columns(file: Path, wanted: Iterable[str]) -> dict[str, Array]:
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise InputError(f"{file}: line {line}: {len(row)} cells under {len(header)} columns")
-    return {name: _column(file, rows[1:], name, header.index(name), point) for name in wanted}
+    columns = {}
+    for name in wanted:
+        cells = [(line, row[header.index(name)].strip()) for line, row in rows[1:]]
+        columns[name] = _column(file, cells, name, point, sparse=name in sparse)
+    return columns
 
 
 def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
@@ -51,18 +57,23 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
             rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not in UTF-8; save it in that encoding") from None
+    except csv.Error as error:
         raise InputError(f"{file}: not a CSV file: {error}") from None
     header = next((k for k, (_, row) in enumerate(rows) if not row[0].startswith(COMMENT)), 0)
     return rows[header:], "." if separator == "," else ","
 
 
 def _column(
-    file: Path, rows: list[tuple[int, list[str]]], name: str, index: int, point: str
+    file: Path, cells: list[tuple[int, str]], name: str, point: str, *, sparse: bool
 ) -> Array:
-    values = np.empty(len(rows))
-    for k, (line, row) in enumerate(rows):
-        text = row[index].strip()
+    values = np.full(len(cells), math.nan)
+    if sparse and not any(text for _, text in cells):
+        raise InputError(f"{file}: column {name} is blank")
+    for k, (line, text) in enumerate(cells):
+        if sparse and not text:
+            continue
         number = text.replace(point, ".")
         if not _is_number(number):
             shown = repr(text) if text else "empty"

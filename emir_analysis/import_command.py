@@ -32,7 +32,7 @@ from emir_msgs_py.topics import FLUID_PRESSURE, JOINT_STATE
 METADATA = "emir.import"  # the record that says where a recording came from
 LAST_STAMP = 2**31  # s, of a ROS stamp
 LAST_INDEX = 99  # of a field: a JointState with a hundred joints
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "sample": 1.0}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "sample": 1.0}
 UNITS = {  # a column's unit -> SI unit, factor
     "bar": ("Pa", 1e5), "mbar": ("Pa", 100.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6),
     "psi": ("Pa", 6894.757293168), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "kN": ("N", 1e3),
@@ -72,6 +72,7 @@ class Imported:
 def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None) -> Imported:
     """Write the mapped columns of a CSV file as a rosbag2 recording in the folder `out`.
 
+    A blank cell is no message: signals may have been sampled at different times.
     rows: which of the table's rows; all when not given. Raises InputError or ParameterError,
     one line each, for a map or a table that cannot be used and for a folder that exists.
     """
@@ -80,7 +81,7 @@ def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None)
     wanted = [column.name for column in columns.values()]
     if clock.column is not None:
         wanted.append(clock.column)
-    read = read_columns(table, dict.fromkeys(wanted))
+    read = read_columns(table, dict.fromkeys(wanted), sparse=wanted[: len(columns)])
     count = next(iter(read.values())).size
     chosen = np.arange(count)[rows or slice(None)]
     if chosen.size == 0:
@@ -106,9 +107,10 @@ def write_signals(
 ) -> None:
     """Write signals that share their times (n,), s, as a recording of standard messages.
 
-    values: (n,) by name. sources: topic and field of each. about: stored as metadata; what it
-    says of a signal's name is stored with the field, too. Raises
-    InputError for a field that no supported message has, ParameterError for an existing folder.
+    values: (n,) by name, NaN where there is none: its topic then has no message. sources: topic
+    and field of each. about: stored as metadata; what it says of a signal's name is stored with
+    the field, too. Raises InputError for a field that no supported message has, ParameterError
+    for an existing folder.
     """
     stamps = np.round(time * 1e9).astype(np.int64)
     topics = {source.topic for source in sources.values()}
@@ -129,6 +131,8 @@ def write_signals(
         for k, stamp in enumerate(stamps.tolist()):
             for topic, signals in members.items():
                 now = {signals[name].field: float(values[name][k]) for name in signals}
+                if any(map(math.isnan, now.values())):
+                    continue
                 message = _message(kinds[topic], stamp, list(signals), now)
                 writer.write(topic, encoders[kinds[topic]](message), stamp, stamp)
 
@@ -171,6 +175,13 @@ def _columns(file: Path) -> dict[str, Column]:
         found[name] = Column(str(entry["column"]), source, factor)
     if not found:
         raise InputError(f"{file}: no signal in it")
+    taken: dict[str, str] = {}
+    for name, column in found.items():
+        if column.name in taken:
+            raise InputError(
+                f"{file}: {taken[column.name]} and {name} are one column, {column.name}"
+            )
+        taken[column.name] = name
     return found
 
 

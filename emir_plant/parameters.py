@@ -114,6 +114,7 @@ class Sensors:
     pressure_noise: float = quantity("Pa", 0.0, 1e6, "standard deviation")
     deflection_noise: float = quantity("rad", 0.0, 1e-2, "standard deviation")
     own_stroke: int = quantity("1", 0, 1, "stroke: 0 by the angle, 1 measured", default=0)
+    command_period: float = quantity("s", 0.0, 1.0, "of valve commands; 0: unknown", default=0.0)
     seed: int = quantity("1", 0, 2**31 - 1, "of the noise", default=0)
 
     @property

@@ -51,13 +51,19 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     ParameterError, one line each, for anything that cannot be used; IncompleteError, with the
     result, where a judge recording or an output cannot.
     """
-    judges = _several(judge)
-    inputs = [datasheet, signals, *_several(bag), *judges]
+    bags, judges = _several(bag), _several(judge)
+    inputs = [datasheet, signals, *bags, *judges]
     check_outputs([json, model_out, html], predictions, inputs)
     sheet = load_sheet(datasheet or data("joint1.yaml"))
     missing = [path for path in judges if not path.exists()]
     if missing:
         raise InputError(f"{missing[0]}: no such recording")
+    learned = {path.resolve() for path in bags}
+    if len(learned) < len(bags):
+        raise InputError(f"{', '.join(map(str, bags))}: the same recording twice")
+    for path in judges:
+        if path.resolve() in learned:
+            progress(f"{path}: judged on what was learned from: no measure of other recordings")
     signal_map = None if signals is None else _checked_map(signals)
     for file, unread in (
         (datasheet, sheet.ignored),
@@ -65,7 +71,7 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     ):
         if unread:
             progress(f"{file}: not used: {', '.join(unread)}")
-    experiments = [_opened(each, signal_map, sheet.machine, progress) for each in _several(bag)]
+    experiments = [_opened(each, signal_map, sheet.machine, progress) for each in bags]
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
     opened, failed = _judges(judges, signal_map, sheet.machine, progress)

@@ -84,7 +84,7 @@ def curve(machine: Machine) -> Curve | None:
 
 def told_forms(kind: Kind, evidence: Evidence) -> list[tuple[str, ...]]:
     """Return a kind's forms whose signal sensors show, and all balances in which they act."""
-    if not np.any(np.isfinite(visited(kind.over, evidence))):
+    if not np.any(np.isfinite(visited(kind.over, evidence))) or not np.ptp(ends(kind, evidence)):
         return []
     told = {name for name, tells in zip(BALANCES, evidence.told, strict=True) if tells}
     return [

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from emir_analysis.diagnosis.command_grid import as_given
 from emir_analysis.diagnosis.recording_checks import (
     Stamps,
     check_before_command,
@@ -193,7 +194,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     # one microsecond of slack against stamps that were rounded
     time = begin + np.arange(int((end - begin + 1e-6) / period) + 1) * period
     shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
-    commands = _held(recording[COMMAND], begin, every * (time.size - 1))
+    command = as_given(name, recording[COMMAND], machine.sensors.command_period)
+    commands = _held(command, begin, every * (time.size - 1))
     rest = _rest(name, commands, period, machine)
     measured = frozenset(shown)
     angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)

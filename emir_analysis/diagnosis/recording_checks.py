@@ -18,8 +18,15 @@ USUAL = 0.95  # of all
 FROZEN = 1.0  # s that a sensor with noise shows the same number
 OFTEN = 0.05  # share of readings that repeat the one before, where steps are coarse
 CLIPPED = 0.01  # share of readings that are the sensor's last
-WILD = 0.5  # of nearly the whole range, by which one reading is off both of its neighbours
+WILD = 0.5  # of nearly the whole range, by which no signal jumps away and back again ...
+WILD_AT_ONCE = 0.25  # ... nor pressure and motion from one reading to one that soon follows
+SOON = 0.02  # s
+BACK = 2.0  # s, within which wild readings end
 NEARLY_ALL = 0.99
+STUCK = 20.0  # s that a sensor shows nothing but its noise ...
+QUIET = 1.3  # ... times what is stated of that
+TRAVEL = 0.1  # of the whole travel, which the boom makes upwards and downwards in that time
+NEGATIVE = -0.05  # of the pump's pressure; an absolute one is above 0, but for a bias
 FAR_OFF = 20.0  # times its noise: the same of a signal that hardly moves
 NOISE = {  # of the sensors that have some
     "pressure_lifting": "pressure_noise",
@@ -101,8 +108,10 @@ def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine
     angle: (n,) rad at times, (n,) s.
     """
     _check_wild(name, signal, machine)
+    moved = np.interp(signal.time, time, angle)
+    _check_stuck(name, signal, moved, machine)
     for end in _ends(signal):
-        if _is_clipped(signal, end, np.interp(signal.time, time, angle), machine):
+        if _is_clipped(signal, end, moved, machine):
             raise InputError(
                 f"{name}: {signal.name} goes no further than {end:.4g} while the boom moves: there"
                 " the sensor's range ends; record with one of a wider range, or leave it out of"
@@ -121,19 +130,47 @@ def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine
 
 
 def _check_wild(name: str, signal: Signal, machine: Machine) -> None:
-    value, aside = signal.value, np.diff(signal.value)
-    size = WILD * np.ptp(np.quantile(value, [1.0 - NEARLY_ALL, NEARLY_ALL]))
+    time, value, aside = signal.time, signal.value, np.diff(signal.value)
+    slow = np.median(np.diff(time)) > SOON or signal.name == "tip_deflection_angle"
+    whole = np.ptp(np.quantile(value, [1.0 - NEARLY_ALL, NEARLY_ALL]))
+    size = (WILD if slow else WILD_AT_ONCE) * whole
     if signal.name in NOISE:
         size = max(size, FAR_OFF * getattr(machine.sensors, NOISE[signal.name]))
-    alone = np.minimum(np.abs(aside[:-1]), np.abs(aside[1:]))
-    wild = (alone > size) & (aside[:-1] * aside[1:] < 0.0)
+    jumps = np.flatnonzero(np.abs(aside) > size)
+    turns = aside[jumps[:-1]] * aside[jumps[1:]] < 0.0
+    wild = turns & (time[jumps[1:]] - time[jumps[:-1]] < BACK)
     if size > 0.0 and np.any(wild):
-        k = int(np.argmax(wild)) + 1
+        k = int(np.argmax(wild))
+        first, after = jumps[k] + 1, jumps[k + 1] + 1
+        when = "at" if after == first + 1 else f"from {time[first]:.3f} to"
         raise InputError(
-            f"{name}: {signal.name} shows {value[k]:.4g} at {signal.time[k]:.3f} s alone,"
-            f" {value[k - 1]:.4g} before and {value[k + 1]:.4g} after; check the sensor's wiring"
-            " and record again"
+            f"{name}: {signal.name} shows {value[first]:.4g} {when} {time[after - 1]:.3f} s alone,"
+            f" {value[first - 1]:.4g} before and {value[after]:.4g} after; check the sensor's"
+            " wiring and record again"
         )
+
+
+def _check_stuck(name: str, signal: Signal, angle: Array, machine: Machine) -> None:
+    """Raise InputError where a sensor shows nothing but its noise while the boom moves both ways.
+
+    In a steady move a pressure may show no more, and over an empty chamber. angle: (n,) rad when
+    the signal was measured.
+    """
+    noise = getattr(machine.sensors, NOISE[signal.name]) if signal.name in NOISE else 0.0
+    count = int(STUCK / np.median(np.diff(signal.time)))
+    for first in range(0, signal.value.size - count + 1, max(1, count // 10)):
+        part = signal.value[first : first + count]
+        moved = angle[first : first + count]
+        up = np.max(moved - np.minimum.accumulate(moved))
+        down = np.max(np.maximum.accumulate(moved) - moved)
+        far = min(up, down) > TRAVEL * np.ptp(angle)
+        empty = part.mean() < signal.value.min() + FAR_OFF * noise
+        if far and not empty and np.std(part) < QUIET * noise:
+            raise InputError(
+                f"{name}: {signal.name} shows nothing but its noise about {part.mean():.4g} from"
+                f" {signal.time[first]:.1f} s on while the boom moves; check the sensor and record"
+                " again, or leave it out of the signal map"
+            )
 
 
 def _ends(signal: Signal) -> tuple[float, ...]:
@@ -243,6 +280,11 @@ def check_values(name: str, shown: dict[str, Array], machine: Machine) -> None:
             raise InputError(
                 f"{name}: {signal} reaches {size:.4g}, more than a machine can; is it in"
                 f" {largest[signal][1]}? It has to be recorded in the signal map's unit"
+            )
+        if signal.startswith("pressure") and np.median(value) < NEGATIVE * machine.supply.p0:
+            raise InputError(
+                f"{name}: {signal} is negative, {np.median(value):.4g} Pa in the middle; is its"
+                " sign turned round? It has to be recorded in Pa, absolute"
             )
         if signal.startswith("pressure") and size < LEAST_PRESSURE * machine.supply.p0:
             raise InputError(

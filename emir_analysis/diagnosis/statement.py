@@ -22,6 +22,9 @@ from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
+ATMOSPHERE = 101325.0  # Pa
+ALIKE = 0.05  # relative
+CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 SHORT = 0.3  # of the recordings: a stretch of time that is named
 PARTS = {  # of a curve, as they are called
@@ -76,7 +79,21 @@ def _of_findings(findings: Findings) -> str:
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
-    return names + (f"; {remainder}" if remainder else "") + _unforeseeable(findings)
+    left = f"; {remainder}" if remainder else ""
+    return names + left + both_pressures(findings.chosen) + _unforeseeable(findings)
+
+
+def both_pressures(chosen: Trial) -> str:
+    """Return what it means that both pressure transducers are off alike, if they are."""
+    effects = chosen.machine.effects
+    bias, delay = effects.sensor_bias, effects.sensor_delay
+    biases = np.array([bias.pressure_lifting, bias.pressure_lowering])
+    if np.all(np.abs(biases + ATMOSPHERE) < ALIKE * ATMOSPHERE):
+        return "; both pressures read an atmosphere less, as gauges do that do not read absolutely"
+    late = np.array([delay.pressure_lifting, delay.pressure_lowering])
+    if late.min() > CLOCK and np.ptp(late) < ALIKE * late.max():
+        return "; both pressures come equally late, as by another clock"
+    return ""
 
 
 def of_stamps(experiments: Sequence[Experiment]) -> str:

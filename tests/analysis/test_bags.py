@@ -74,6 +74,20 @@ def _no_mcap(bag: Path) -> tuple[Path, str]:
     return bag, "no .mcap file"
 
 
+def _part_missing(bag: Path) -> tuple[Path, str]:
+    file = next(bag.glob("*.mcap"))
+    file.rename(file.with_name("part_1.mcap"))
+    return bag, f"{file.name}, which its metadata.yaml lists, is missing"
+
+
+def _other_storage(bag: Path) -> tuple[Path, str]:
+    file = next(bag.glob("*.mcap"))
+    file.rename(file.with_name("bag_0.db3"))
+    metadata = bag / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace(file.name, "bag_0.db3"))
+    return bag, "bag_0.db3 is no .mcap file; `ros2 bag convert` makes one"
+
+
 def _no_topic(bag: Path) -> tuple[Path, str]:
     recorded.write_bag(bag.parent / "other", {"cylinder": (TIME, ANGLE)})
     return bag.parent / "other", "/rig/joint_states is not recorded; there are: /rig/cylinder"
@@ -90,7 +104,10 @@ def _no_message(bag: Path) -> tuple[Path, str]:
     return bag, "there are: none"
 
 
-@pytest.mark.parametrize("spoil", [_no_path, _no_mcap, _no_topic, _not_mcap, _no_message])
+@pytest.mark.parametrize(
+    "spoil",
+    [_no_path, _no_mcap, _part_missing, _other_storage, _no_topic, _not_mcap, _no_message],
+)
 def test_what_cannot_be_read_is_told_in_one_line(
     bag: Path, spoil: Callable[[Path], tuple[Path, str]]
 ) -> None:

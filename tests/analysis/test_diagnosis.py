@@ -308,6 +308,17 @@ def _loose_contact(topics: Topics) -> None:
     topics["pressure_lifting"] = (time, np.where(np.arange(time.size) == 700, 0.0, value))
 
 
+def _drop_out(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    lost = (time > 6.995) & (time < 7.075)
+    topics["pressure_lifting"] = (time, np.where(lost, -999.0, value))
+
+
+def _sign_turned(topics: Topics) -> None:
+    time, value = topics["pressure_lifting"]
+    topics["pressure_lifting"] = (time, -value)
+
+
 def _gap(topics: Topics) -> None:
     time, value = topics["pressure_lifting"]
     kept = (time < 5.0) | (time > 6.0)
@@ -366,6 +377,8 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_out_of_range, "pressure_lifting goes no further than 8.3e.06 while the boom moves"),
         (_stuck_resolver, "joint_angle stays at .* for 3.0 s from 4.0"),
         (_loose_contact, "pressure_lifting shows 0 at 7.000 s alone"),
+        (_drop_out, "pressure_lifting shows -999 from 7.000 to 7.070 s alone"),
+        (_sign_turned, "pressure_lifting is negative, .* is its sign turned round"),
         (_gap, "gap of 1.0"),
         (_short, "record at least 10 s"),
         (_in_bar, "is it in bar"),
@@ -401,6 +414,40 @@ def test_a_sensor_of_coarse_steps_may_stay_in_one() -> None:
     assert np.all(pressure[200:900] == pressure[200])
     signal = Signal("pressure_lifting", time, pressure, "Pa")
     check_readings("run", signal, time, angle, machine)
+
+
+@pytest.mark.parametrize(("still", "useless"), [(40.0, True), (60.0, False)])
+def test_a_sensor_that_shows_its_noise_alone_while_the_boom_goes_up_and_down_is_told(
+    still: float, *, useless: bool
+) -> None:
+    """From 40 of 60 s on; from the end on it would not be."""
+    machine, time = joint1(), np.arange(6000) * 0.01
+    angle = 0.8 + 0.1 * np.sin(0.5 * time)
+    noise = machine.sensors.pressure_noise * np.random.default_rng(1).standard_normal(time.size)
+    moving = np.where(time < still, angle, 0.8)
+    signal = Signal("pressure_lifting", time, 1e7 * moving + noise, "Pa")
+    if useless:
+        with pytest.raises(InputError, match=r"nothing but its noise about 8e.06 from 40\.0 s on"):
+            check_readings("run", signal, time, angle, machine)
+    else:
+        check_readings("run", signal, time, angle, machine)
+
+
+def test_a_steady_move_may_show_a_steady_pressure() -> None:
+    machine, time = joint1(), np.arange(6000) * 0.01
+    angle = 0.5 + 0.01 * np.minimum(time, 40.0)
+    noise = machine.sensors.pressure_noise * np.random.default_rng(1).standard_normal(time.size)
+    pressure = 1e7 + 2e6 * np.exp(-time) + noise
+    check_readings("run", Signal("pressure_lifting", time, pressure, "Pa"), time, angle, machine)
+
+
+def test_the_same_recording_is_not_given_twice(folder: Path, tmp_path: Path) -> None:
+    for bag in ("a", "a/../a"):
+        (tmp_path / bag).mkdir(exist_ok=True)
+    files = folder / "datasheet.yaml", folder / "signals.yaml"
+    twice = [tmp_path / "a", tmp_path / "a" / ".." / "a"]
+    with pytest.raises(InputError, match="the same recording twice"):
+        command(twice, *files, None, None, None, lambda _: None)
 
 
 def test_what_is_no_recording_is_told(folder: Path, tmp_path: Path) -> None:

@@ -62,6 +62,27 @@ def test_the_same_map_reads_the_recording(tmp_path: Path, signals: Path) -> None
     np.testing.assert_allclose(recording["pressure"].value, [1.5e5, 2.5e5, 3e5])
 
 
+def test_a_blank_cell_is_no_message(tmp_path: Path, signals: Path) -> None:
+    """Signals of other rates share a table; a topic of two needs both."""
+    import_csv(_table(tmp_path, TABLE.replace("20,2.5,0.5", "20,,0.5")), signals, tmp_path / "bag")
+    recording = load(tmp_path / "bag", read_signal_map(signals))
+    np.testing.assert_allclose(recording["pressure"].time, [0.0, 0.05])
+    np.testing.assert_allclose(recording["stroke"].time, [0.0, 0.02, 0.05])
+    half = TABLE.replace("20,2.5,0.5", "20,2.5,")
+    import_csv(_table(tmp_path, half), signals, tmp_path / "half")
+    recording = load(tmp_path / "half", read_signal_map(signals))
+    np.testing.assert_allclose(recording["speed"].time, [0.0, 0.05])
+
+
+def test_a_table_in_another_encoding_is_told(
+    tmp_path: Path, signals: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "table.csv").write_bytes(TABLE.replace("remark", "Öl").encode("latin-1"))
+    words = [str(tmp_path / "table.csv"), "--signals", str(signals)]
+    assert main(["import", *words, "--out", str(tmp_path / "bag")]) == 1
+    assert "not in UTF-8" in capsys.readouterr().err
+
+
 GERMAN = TABLE.replace(",", ";").replace(".", ",")
 
 
@@ -119,7 +140,8 @@ def test_rows_without_times_are_samples(tmp_path: Path, capsys: pytest.CaptureFi
     [
         ("t,p,x\n0,1,2\n", "no column v; there are t, p, x"),
         ("t,p,x,v\n0,1,nan,3\n", "line 2: x is nan"),
-        ("t,p,x,v\n0,1,2,3\n1,1,,3\n", "line 3: x is empty, not a number"),
+        ("t,p,x,v\n0,1,,3\n1,1,,3\n", "column x is blank"),
+        ("t,p,x,v\n0,1,2,3\n,1,2,3\n", "line 3: t is empty, not a number"),
         ("t,p,x,v\n0,1,oil,3\n", "line 2: x is 'oil', not a number"),
         ("t,p,x,v\n0,1,2,3\n1,2,3\n", "line 3: 3 cells under 4 columns"),
         ("0,1,2,3\n1,2,3,4\n", "no header"),
@@ -145,17 +167,19 @@ def test_a_table_of_no_use_is_told_in_one_line(
     ("entry", "reason"),
     [
         ("{topic: /a, field: data, unit: m}", "needs the column"),
-        ("{column: x, topic: /a, field: temperature, unit: K}", "no message for temperature"),
+        ("{column: x, topic: /a, field: data, unit: m}", "stroke and other are one column, x"),
+        ("{column: w, topic: /a, field: temperature, unit: K}", "no message for temperature"),
         ("{column: x, column_unit: bar, topic: /a, field: data, unit: m}", "no signal in m"),
-        ("{column: x, topic: /rig/pressure, field: fluid_pressure, unit: Pa}", "in one field"),
-        ("{column: x, topic: /a, field: 'position[100]', unit: m}", "an index is at most 99"),
+        ("{column: w, topic: /rig/pressure, field: fluid_pressure, unit: Pa}", "in one field"),
+        ("{column: w, topic: /a, field: 'position[100]', unit: m}", "an index is at most 99"),
     ],
 )
 def test_a_map_of_no_use_is_told(
     entry: str, reason: str, tmp_path: Path, signals: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     signals.write_text(f"{MAP}other: {entry}\n")
-    words = [str(_table(tmp_path)), "--signals", str(signals), "--out", str(tmp_path / "bag")]
+    table = _table(tmp_path, TABLE.replace("remark", "w").replace("start", "1").replace("end", "2"))
+    words = [str(table), "--signals", str(signals), "--out", str(tmp_path / "bag")]
     assert main(["import", *words]) == 1
     assert reason in capsys.readouterr().err
 

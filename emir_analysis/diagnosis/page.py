@@ -26,7 +26,7 @@ from emir_analysis.diagnosis.result import (
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.statement import PARTS
-from emir_analysis.diagnosis.summary import cautions
+from emir_analysis.diagnosis.summary import cautions, in_short
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
@@ -42,6 +42,7 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
     """Write the report as HTML. Raises InputError when the file cannot be written."""
     blocks: list[Block] = [
         Text(f"{VERDICTS[result.verdict]}: {result.statement}.", lead=True),
+        Text(in_short(result)),
         *[Text(line) for line in cautions(result)],
         *_effects(result.effects),
         *_free_runs(findings, result, judged),
@@ -94,6 +95,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
         Table(
             columns,
             rows,
+            "p_H is the pressure in the lifting chamber, p_S in the lowering one. "
             "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
             "of the sensor noise (which is given in the signal's unit). Up to 1.1 is at the noise, "
             "up to 2 explained. The black box is a linear model of measured signals, trained on "

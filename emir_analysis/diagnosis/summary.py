@@ -1,5 +1,8 @@
 """The result of a diagnosis as lines for a terminal."""
 
+import math
+from pathlib import Path
+
 from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult, parameter_line
 
 
@@ -39,6 +42,35 @@ def cautions(result: Diagnosis) -> list[str]:
             " but where this one cannot, something else is missing"
         )
     return lines + list(result.untold.values())
+
+
+def in_short(result: Diagnosis) -> str:
+    """Return what the errors come to, and what to do with what was found."""
+    worst = {stage: _worst(result, stage) for stage in ("nominal", "refitted", "with_effect")}
+    came, refitted, after = (f"{error:.3g}" for error in worst.values())
+    errors = f"Largest free-run error of a signal on {Path(result.judged_on).name}, times its noise"
+    if result.effects:
+        return (
+            f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted, {after}"
+            " with what was found. Mend the machine, or go on with it as it is: --model-out writes"
+            " it, emir run --params simulates it and emir design --from designs for it."
+        )
+    if result.verdict == "nothing_missing":
+        return (
+            f"{errors}: {came} by the data sheet, {after} with its parameters fitted. Take these,"
+            " below, in place of the stated ones; --model-out writes them."
+        )
+    return (
+        f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted"
+        + (f", {after} with the curve that was measured" if result.curve is not None else "")
+        + ". Look for the cause in the parts of the machine whose balances speak below, at the"
+        " values and times that the pictures of them show."
+    )
+
+
+def _worst(result: Diagnosis, stage: str) -> float:
+    errors = [getattr(s, stage) / s.noise for s in result.signals.values()]
+    return max(errors, default=math.nan)
 
 
 def _ratios(s: SignalResult) -> str:

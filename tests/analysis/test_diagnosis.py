@@ -150,7 +150,9 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     assert written["verdict"] == "found"
     assert written["effects"][0]["parameters"]["force"]["unit"] == "N"
     assert written["balances"]["force"].keys() == {"unit", "noise", "before", "refitted", "after"}
-    assert (tmp_path / "a.html").read_text().count("<img") == 3
+    page = (tmp_path / "a.html").read_text()
+    assert page.count("<img") == 3
+    assert "emir design --from designs for it" in page
 
 
 def test_an_effect_outside_the_registry_is_called_unexplained(

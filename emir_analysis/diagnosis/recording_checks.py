@@ -289,5 +289,5 @@ def check_values(name: str, shown: dict[str, Array], machine: Machine) -> None:
         if signal.startswith("pressure") and size < LEAST_PRESSURE * machine.supply.p0:
             raise InputError(
                 f"{name}: {signal} stays below {size:.4g} Pa, no pressure that carries a boom; is"
-                " it in bar? It has to be recorded in Pa, absolute"
+                " it in bar, kPa, MPa or psi? It has to be recorded in Pa, absolute"
             )

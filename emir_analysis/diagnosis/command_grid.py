@@ -6,6 +6,7 @@ up. But the commands were given on a grid of the period that the data sheet stat
 lies between two rows: together they tell where that grid lies.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,18 +17,21 @@ from emir_analysis.signals import Array, Signal
 
 FEWEST = 20  # changes that have to agree; by chance half of them would rule out any grid
 PHASES = 1000  # that are tried
+OFTENER = 0.75  # of the period, at most: rows that come often enough to sample commands
+MOST_ROWS = 0.9  # of a command's stamps that are a sensor's
 NARROW = 0.5  # of a row: how well the changes have to tell the phase
 STRAIGHT = 1e-9  # of the command's range: second differences of a straight line by rounding
 
 
-def as_given(name: str, command: Signal, period: float) -> Signal:
-    """Return a command with its changes when they were given, if it was sampled more often.
+def as_given(name: str, command: Signal, sensors: Sequence[Signal], period: float) -> Signal:
+    """Return a command with its changes when they were given, if it was sampled with a sensor.
 
-    period: s, between two commands, 0 where it is not stated. As it is where its changes agree
-    with no grid of that period. Raises InputError for one that was interpolated between commands.
+    period: s, between two commands, 0 where it is not stated. As it is where it has stamps of its
+    own, and where its changes agree with no grid of that period. Raises InputError for one that
+    was interpolated between commands.
     """
     rows = np.diff(command.time)
-    if period == 0.0 or rows.size < FEWEST or np.median(rows) >= 0.75 * period:
+    if period == 0.0 or np.median(rows) > OFTENER * period or not _in_rows(command, sensors):
         return command
     changed = np.flatnonzero(np.diff(command.value)) + 1
     phase = _phase(command.time[changed - 1], command.time[changed], period)
@@ -42,6 +46,11 @@ def as_given(name: str, command: Signal, period: float) -> Signal:
             f" {period:g} s: it was interpolated; record it as it was given, held in between"
         )
     return command
+
+
+def _in_rows(command: Signal, sensors: Sequence[Signal]) -> bool:
+    """Tell whether the command has the stamps of a sensor."""
+    return any(np.mean(np.isin(command.time, sensor.time)) > MOST_ROWS for sensor in sensors)
 
 
 def _phase(earliest: Array, latest: Array, period: float) -> float | None:

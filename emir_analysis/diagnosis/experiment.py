@@ -194,7 +194,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     # one microsecond of slack against stamps that were rounded
     time = begin + np.arange(int((end - begin + 1e-6) / period) + 1) * period
     shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
-    command = as_given(name, recording[COMMAND], machine.sensors.command_period)
+    period_stated = machine.sensors.command_period
+    command = as_given(name, recording[COMMAND], list(sensors.values()), period_stated)
     commands = _held(command, begin, every * (time.size - 1))
     rest = _rest(name, commands, period, machine)
     measured = frozenset(shown)

@@ -9,6 +9,7 @@ from emir_analysis.signals import Array, Signal
 
 PERIOD, ROW = 0.032, 0.01  # s
 TIME = np.arange(0.0, 30.0, ROW)
+SENSORS = [Signal("joint_angle", TIME, np.zeros_like(TIME), "rad")]
 
 
 def given(phase: float) -> tuple[Array, Array]:
@@ -30,7 +31,7 @@ def signal(time: Array, value: Array) -> Signal:
 def test_a_command_held_over_rows_is_put_back_to_when_it_was_given(phase: float) -> None:
     """32 ms and 10 ms have 2 ms in common: to within half of these the rows tell when."""
     time, value = given(phase)
-    found = as_given("run", signal(TIME, held(time, value, TIME)), PERIOD)
+    found = as_given("run", signal(TIME, held(time, value, TIME)), SENSORS, PERIOD)
     fine = np.arange(0.5, 29.0, 1e-4)
     restored, true = (held(*pair, fine) for pair in ((found.time, found.value), (time, value)))
     sampled = held(TIME, held(time, value, TIME), fine)
@@ -41,7 +42,7 @@ def test_a_command_held_over_rows_is_put_back_to_when_it_was_given(phase: float)
 def test_a_command_that_was_interpolated_is_told() -> None:
     time, value = given(0.0)
     with pytest.raises(InputError, match="it was interpolated; record it as it was given"):
-        as_given("run", signal(TIME, np.interp(TIME, time, value)), PERIOD)
+        as_given("run", signal(TIME, np.interp(TIME, time, value)), SENSORS, PERIOD)
 
 
 def test_another_command_stays_as_it_is() -> None:
@@ -51,10 +52,11 @@ def test_another_command_stays_as_it_is() -> None:
     random = np.random.default_rng(2).uniform(-1.0, 1.0, TIME.size)
     for command, period in (
         (signal(time, value), PERIOD),
+        (signal(TIME + 1e-3, held(time, value, TIME)), PERIOD),
         (signal(TIME, held(time, value, TIME)), 0.0),
         (signal(TIME, held(time, value, TIME)), 0.05),
         (signal(TIME, random), PERIOD),
         (signal(TIME, ramp), PERIOD),
         (signal(TIME, np.where(TIME < 5.0, 0.0, 0.5)), PERIOD),
     ):
-        assert as_given("run", command, period) is command
+        assert as_given("run", command, SENSORS, period) is command

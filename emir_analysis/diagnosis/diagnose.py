@@ -21,6 +21,8 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
 
+FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -144,12 +146,15 @@ def loudest(residual: Array, floor: Array, limit: Array) -> str | None:
 def loud(residual: Array, floor: Array, limit: Array) -> list[str]:
     """Return the balances that speak, that furthest above its noise first.
 
-    A missing force bends the boom too, so the bending counts only where nothing else speaks.
+    A missing force bends the boom too, so the bending counts only where nothing else speaks, or
+    it is far louder than any force makes it.
     """
     left = level(residual)
     loudness = dict(zip(BALANCES, left / floor, strict=True))
     speaking = [name for name, over in zip(BALANCES, left > limit, strict=True) if over]
     first = [name for name in speaking if name != "bending"]
+    if loudness["bending"] > FAR_LOUDER * max(map(loudness.__getitem__, first), default=0.0):
+        first = speaking
     return sorted(first or speaking, key=loudness.__getitem__, reverse=True)
 
 

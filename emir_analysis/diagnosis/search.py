@@ -277,7 +277,27 @@ class Search:
                 return better
         known = [t.trial.effects for t in better]
         others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
-        return better + self._better(others, best)
+        better += self._better(others, best)
+        return better or self._in_held_back(best)
+
+    def _in_held_back(self, best: Tried) -> list[Tried]:
+        """Return what suffices with one effect more that acts in the part held back alone.
+
+        The part that the fits see is explained without, so that nothing there asks for it.
+        """
+        unexplained = EXPLAINED**2 - 1.0
+        if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
+            return []
+        near = self._evidence.until(_astray(best.trial, self._evidence) + SHORTEST)
+        limit = (1.0 - PROMISING) * excess(best.trial, near)
+        found = []
+        for screened in screen_free_run(best.trial, self._sheet, near)[:MOST_SIMULATED]:
+            if excess(screened.trial, near) < limit:
+                fitted = self.whole.fitted(screened.trial)
+                if self._suffices(fitted, best.trial):
+                    found.append(self._scored(fitted, free_run_score(fitted, self._evidence)))
+        self.tried += found
+        return found
 
     def _beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.

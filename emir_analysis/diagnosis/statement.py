@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial
+from emir_analysis.diagnosis.candidates import Trial, free_run_errors
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
+from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
 from emir_analysis.diagnosis.screening import LOAD
@@ -24,6 +25,7 @@ MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
+DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 SHORT = 0.3  # of the recordings: a stretch of time that is named
@@ -50,7 +52,10 @@ def verdict(findings: Findings, judged: Judged) -> str:
 
 def statement(findings: Findings, judged: Judged) -> str:
     """Return the verdict in words, and what the judge recordings say of it."""
-    return _of_findings(findings) + _judgement(findings, judged)
+    words = _of_findings(findings)
+    if findings.verdict == "nothing_missing" and judged.surprising:
+        words = f"of {findings.evidence.name}, {words}"
+    return words + _judgement(findings, judged)
 
 
 def _of_findings(findings: Findings) -> str:
@@ -71,28 +76,47 @@ def _of_findings(findings: Findings) -> str:
         if findings.curve is None:
             remainder += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
             if speaking == "force" and _is_untold(shape, findings.swing, lies):
-                remainder += ", as of a load from outside whose course is none that is looked for"
+                remainder += (
+                    "; it may be a load from outside (wind, a push, a load that swings) of another"
+                    " course over time than those looked for"
+                )
     if findings.verdict == "unexplained":
         known = "" if findings.rejected is None else f"{closest(findings.rejected)}; "
-        left = remainder or "the balances are quiet, but the free run drifts away"
+        left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
         return known + left + of_stamps(findings.evidence.experiments)
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
     left = f"; {remainder}" if remainder else ""
-    return names + left + both_pressures(findings.chosen) + _unforeseeable(findings)
+    return names + left + other_reasons(findings.chosen) + _unforeseeable(findings)
 
 
-def both_pressures(chosen: Trial) -> str:
-    """Return what it means that both pressure transducers are off alike, if they are."""
+def other_reasons(chosen: Trial) -> str:
+    """Return what else shows as what was found does: gauges, another clock, a leaning base."""
     effects = chosen.machine.effects
     bias, delay = effects.sensor_bias, effects.sensor_delay
     biases = np.array([bias.pressure_lifting, bias.pressure_lowering])
     if np.all(np.abs(biases + ATMOSPHERE) < ALIKE * ATMOSPHERE):
         return "; both pressures read an atmosphere less, as gauges do that do not read absolutely"
+    if {"sensor_bias", "linkage_error"} <= set(chosen.effects) and bias.angle:
+        return "; a machine that is not level shows the same"
     late = np.array([delay.pressure_lifting, delay.pressure_lowering])
     if late.min() > CLOCK and np.ptp(late) < ALIKE * late.max():
         return "; both pressures come equally late, as by another clock"
+    return ""
+
+
+def _from(findings: Findings) -> str:
+    """Return from when on the free run of parameters alone is off."""
+    evidence = findings.evidence
+    each = free_run_errors(findings.refitted.machine, evidence)
+    for experiment, errors in zip(evidence.experiments, each, strict=True):
+        second = max(1, round(1.0 / experiment.period))
+        blocks = [rms(errors[k : k + second].ravel()) for k in range(0, len(errors), second)]
+        off = np.flatnonzero(np.array(blocks) > DRIFTED)
+        if off.size:
+            when = float(experiment.time[int(off[0]) * second])
+            return f" from {when:.0f} s of {experiment.name} on"
     return ""
 
 
@@ -130,7 +154,10 @@ def _unforeseeable(findings: Findings) -> str:
 def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.curve is not None:
         return _measured(findings.curve, findings, judged)
-    if findings.verdict == "unexplained" or not judged.surprising:
+    if findings.verdict == "unexplained":
+        elsewhere = _elsewhere(findings, judged)
+        return f"; {judged.evidence.name} goes beyond that{elsewhere}" if elsewhere else ""
+    if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
@@ -214,8 +241,8 @@ def _is_untold(shape: Shape, swing: Swing | None, lies: Where) -> bool:
 
 
 def at_end(findings: Findings) -> tuple[str, ...]:
-    """Return the parameters of a model that explains, but may do so by the wrong means."""
-    return () if findings.verdict == "unexplained" else _ends(findings.chosen)
+    """Return the parameters of a model that stand at an end: it may explain by the wrong means."""
+    return _ends(findings.chosen)
 
 
 def _ends(chosen: Trial) -> tuple[str, ...]:

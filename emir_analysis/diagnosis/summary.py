@@ -6,6 +6,9 @@ from pathlib import Path
 from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult, parameter_line
 
 
+ROUNDING = 1e-6  # relative
+
+
 def summary(result: Diagnosis) -> str:
     """Return the result as lines for a terminal."""
     lines = [f"{result.verdict}: {result.statement}"]
@@ -13,6 +16,8 @@ def summary(result: Diagnosis) -> str:
     lines += [line for effect in result.effects for line in _sizes(effect)]
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in result.balances.items():
+        if name == "linkage" and max(b.before, b.refitted, b.after) < ROUNDING * b.noise:
+            continue  # the stroke is what the linkage makes of the angle
         figures = (b.noise, b.before, b.refitted, b.after)
         lines.append(f"{name:24}" + "".join(f"{f:11.3g}" for f in figures) + f"  {b.unit}")
     lines += ["", f"free-run error on {result.judged_on}, times the sensor noise"]

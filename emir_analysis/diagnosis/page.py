@@ -26,7 +26,7 @@ from emir_analysis.diagnosis.result import (
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.statement import PARTS
-from emir_analysis.diagnosis.summary import cautions, in_short
+from emir_analysis.diagnosis.summary import cautions, in_short, told_balances
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
@@ -125,7 +125,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
             [
                 (label, *(factor * f for f in (b.noise, b.before, b.refitted, b.after)))
                 for label, factor, b in (
-                    (*SHOWN[name], b) for name, b in result.balances.items() if name in SHOWN
+                    (*SHOWN[name], b) for name, b in told_balances(result).items() if name in SHOWN
                 )
             ],
             f"RMS over windows of half a second to a second of {Path(result.recording).name}; "

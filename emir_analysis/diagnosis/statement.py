@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
 from emir_analysis.diagnosis.screening import LOAD
+from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.shape import TOLD, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
@@ -156,7 +157,7 @@ def _judgement(findings: Findings, judged: Judged) -> str:
         return _measured(findings.curve, findings, judged)
     if findings.verdict == "unexplained":
         elsewhere = _elsewhere(findings, judged)
-        return f"; {judged.evidence.name} goes beyond that{elsewhere}" if elsewhere else ""
+        return f"; {judged.evidence.name} goes further{elsewhere}" if elsewhere else ""
     if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
@@ -272,4 +273,7 @@ def tell_apart(findings: Findings) -> str | None:
             f"no movement that is known tells them apart: in {best}, where they differ most, by"
             f" {apart:.1f} times the noise"
         )
-    return f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise"
+    often = " only: repeat it" if apart < EXPLAINED else ""
+    return (
+        f"to tell them apart record {best}: they then differ by {apart:.1f} times the noise{often}"
+    )

@@ -3,8 +3,13 @@
 import math
 from pathlib import Path
 
-from emir_analysis.diagnosis.result import Diagnosis, EffectResult, SignalResult, parameter_line
-
+from emir_analysis.diagnosis.result import (
+    BalanceResult,
+    Diagnosis,
+    EffectResult,
+    SignalResult,
+    parameter_line,
+)
 
 ROUNDING = 1e-6  # relative
 
@@ -15,9 +20,7 @@ def summary(result: Diagnosis) -> str:
     lines += cautions(result)
     lines += [line for effect in result.effects for line in _sizes(effect)]
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
-    for name, b in result.balances.items():
-        if name == "linkage" and max(b.before, b.refitted, b.after) < ROUNDING * b.noise:
-            continue  # the stroke is what the linkage makes of the angle
+    for name, b in told_balances(result).items():
         figures = (b.noise, b.before, b.refitted, b.after)
         lines.append(f"{name:24}" + "".join(f"{f:11.3g}" for f in figures) + f"  {b.unit}")
     lines += ["", f"free-run error on {result.judged_on}, times the sensor noise"]
@@ -36,6 +39,15 @@ def summary(result: Diagnosis) -> str:
 def _sizes(effect: EffectResult) -> list[str]:
     """Return an effect's parameters with their intervals, a line for each."""
     return [parameter_line(f"{effect.name}.{n}", p, p.unit) for n, p in effect.parameters.items()]
+
+
+def told_balances(result: Diagnosis) -> dict[str, BalanceResult]:
+    """Return the balances that tell something: not that of a stroke computed from the angle."""
+    return {
+        name: b
+        for name, b in result.balances.items()
+        if name != "linkage" or max(b.before, b.refitted, b.after) > ROUNDING * b.noise
+    }
 
 
 def cautions(result: Diagnosis) -> list[str]:

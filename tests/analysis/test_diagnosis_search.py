@@ -305,6 +305,30 @@ def test_a_load_of_one_recording_may_not_be_another_s() -> None:
     assert "a load from outside" not in statement(found, unloaded)
 
 
+def test_a_fault_of_the_logic_block_that_shuts_in_the_part_held_back_alone_is_found() -> None:
+    """It lifts for two thirds of the time: what the fits see is explained without."""
+    stated = joint1()
+    lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
+    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 2)
+    fault = with_values(stated, {"effects.logic_block_fault.threshold": 30e5})
+    run = operated(fault, np.concatenate([lifted, lowered]), angle=1.2)
+    searched = Search(Evidence([run], stated), Sheet(stated, TOLERANCES, {}, ()), lambda _: None)
+    (found,) = searched.run()
+    assert found.effects == ("logic_block_fault",)
+    threshold = found.machine.effects.logic_block_fault.threshold
+    assert threshold == pytest.approx(30e5, rel=0.02)
+
+
+@pytest.mark.parametrize(("bending", "first"), [(6.0, "force"), (12.0, "bending")])
+def test_bending_that_no_force_makes_comes_first(bending: float, first: str) -> None:
+    """A missing force makes it no louder than the force balance, a loose flange does."""
+    loudness = np.array([3.0, 0.9, 0.9, 0.0, bending])
+    floor = np.array([250.0, 3e-6, 2e-6, 7e-5, 6e-6])
+    residual = np.tile(loudness * floor, (40, 1))
+    assert list(BALANCES)[0::4] == ["force", "bending"]
+    assert loudest(residual, floor, 1.4 * floor) == first
+
+
 def test_three_effects_are_found_together() -> None:
     hidden = {"effects.payload.mass": 200.0, "effects.command_delay.delay": 0.03}
     searched, _, evidence = search(hidden | SHIFT)

@@ -48,7 +48,7 @@ class Whole:
         self._evidence, self._sheet = evidence, sheet
         self._floor, self._progress = floor, progress
         self._known: dict[tuple[str, ...], Trial] = {}
-        self._with_fewest: set[tuple[str, ...]] = set()  # effects whose sizes are all needed
+        self._with_fewest: set[frozenset[str]] = set()  # sizes that are all needed
 
     def fitted(self, chosen: Trial) -> Trial:
         """Return a trial fitted to the free run of the whole recordings."""
@@ -89,7 +89,6 @@ class Whole:
         Beside another that explains nothing a size may not find its way.
         """
         best = full
-        self._with_fewest.add(full.effects)
         for effect in full.effects:
             if REGISTRY[effect].is_series:
                 best = self._with_terms_that_tell(best, effect)
@@ -97,6 +96,7 @@ class Whole:
             alone = min(best.with_each_size(effect), key=self.score, default=None)
             if alone is not None:
                 best = min(best, refine_free_run(alone, self._evidence, best), key=self.score)
+        self._with_fewest.add(_sizes(best))
         return best
 
     def _with_terms_that_tell(self, known: Trial, effect: str) -> Trial:
@@ -168,7 +168,7 @@ class Whole:
         may lead to where neither is right, such as a negative compliance.
         """
         if not sticks(fitted):
-            if fitted.effects not in self._with_fewest:
+            if _sizes(fitted) not in self._with_fewest:
                 fitted = self._with_fewer_sizes(fitted)
         elif breakaway_may_be_none(fitted):
             plain = without_breakaway(fitted, self._sheet)
@@ -220,3 +220,9 @@ class Whole:
         if VISCOUS not in led.effects or viscous_is_heard(led, self._evidence, self._floor):
             return led
         return refine_free_run(led.without(VISCOUS), self._evidence)
+
+
+def _sizes(fitted: Trial) -> frozenset[str]:
+    """Return the sizes of effects that are fitted, by dotted path."""
+    members = fitted.unknowns.members
+    return frozenset(u.path for u in members if not (u.toleranced or u.shapes))

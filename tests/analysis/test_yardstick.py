@@ -22,7 +22,6 @@ from emir_analysis.yardstick import (
 )
 from emir_common.parameter_tree import with_values
 from emir_control.actuator import Actuator, Oil
-from emir_control.boom import GRAVITY
 from emir_plant import core
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
@@ -54,7 +53,7 @@ def test_payload_is_read_from_the_torque_that_holds_the_boom() -> None:
     table = boom_table(joint1())
     arm = joint1().geometry.boom_length
     empty = boom(joint1()).holding_torque
-    assert table.payload(empty + 700.0 * GRAVITY * arm) == pytest.approx(700.0, rel=1e-3)
+    assert table.payload(empty + 700.0 * 9.81 * arm) == pytest.approx(700.0, rel=1e-3)
     assert table.payload(0.0) == 0.0
 
 

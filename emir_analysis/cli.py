@@ -35,10 +35,12 @@ USAGE = """usage: emir COMMAND ...
 
 `emir COMMAND --help` tells more."""
 
+HELP = ("--help", "-h")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code. Errors of the user are one line each."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments) or [HELP[0]]
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
         "import": _import,
@@ -59,10 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "blind": _blind,
         "bench": _bench,
     }
-    if words and words[0] not in (*commands, "-h", "--help"):
+    if words[0] not in (*commands, *HELP):
         return _complain("emir", f"{words[0]!r}: the commands are {', '.join(commands)}")
     try:
-        code = commands.get(words[0], _usage)(words[1:]) if words else _usage([])
+        code = commands.get(words[0], _usage)(words[1:])
         sys.stdout.flush()  # here, not when Python ends, where nothing can be caught
     except (InputError, ParameterError) as error:
         return _complain(f"emir {words[0]}", str(error))
@@ -119,7 +121,8 @@ def _import(words: list[str]) -> int:
     except ValueError:
         raise InputError(f"--rows {o.rows}: not of the form A:B") from None
     made = import_csv(o.table, o.signals, o.out, rows)
-    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}")
+    left = f"; {made.left_out} messages left out for blank cells" if made.left_out else ""
+    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}{left}")
     return 0
 
 

@@ -61,12 +61,16 @@ class Column:
 
 @dataclass(frozen=True)
 class Imported:
-    """What was written: rows, the time of the first and of the last, in s or samples."""
+    """What was written: rows, the time of the first and of the last, in s or samples.
+
+    left_out: messages for which a cell was blank.
+    """
 
     rows: int
     start: float
     end: float
     unit: str
+    left_out: int
 
 
 def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None) -> Imported:
@@ -90,12 +94,12 @@ def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None)
     values = {name: column.factor * read[column.name][chosen] for name, column in columns.items()}
     sources = {name: column.source for name, column in columns.items()}
     origin = {name: f"column {column.name}" for name, column in columns.items()}
-    write_signals(out, time, values, sources, origin | {
+    left_out = write_signals(out, time, values, sources, origin | {
         "file": table.name,
         "time": "a sample stands as one second" if clock.unit == "sample" else "s",
     })  # fmt: skip
     unit = "samples" if clock.unit == "sample" else "s"
-    return Imported(chosen.size, float(time[0]), float(time[-1]), unit)
+    return Imported(chosen.size, float(time[0]), float(time[-1]), unit, left_out)
 
 
 def write_signals(
@@ -104,8 +108,10 @@ def write_signals(
     values: dict[str, Array],
     sources: dict[str, Source],
     about: dict[str, str],
-) -> None:
+) -> int:
     """Write signals that share their times (n,), s, as a recording of standard messages.
+
+    Return how many messages were left out.
 
     values: (n,) by name, NaN where there is none: its topic then has no message. sources: topic
     and field of each. about: stored as metadata; what it says of a signal's name is stored with
@@ -116,6 +122,7 @@ def write_signals(
     topics = {source.topic for source in sources.values()}
     members = {t: {n: s for n, s in sources.items() if s.topic == t} for t in sorted(topics)}
     kinds = {topic: _message_type(topic, signals) for topic, signals in members.items()}
+    left_out = 0
     encoders = {k: serialize_dynamic(k, DEFINITIONS[k])[k] for k in set(kinds.values())}
     with Rosbag2Writer(out) as writer:
         writer.add_metadata(METADATA, about)
@@ -132,9 +139,11 @@ def write_signals(
             for topic, signals in members.items():
                 now = {signals[name].field: float(values[name][k]) for name in signals}
                 if any(map(math.isnan, now.values())):
+                    left_out += 1
                     continue
                 message = _message(kinds[topic], stamp, list(signals), now)
                 writer.write(topic, encoders[kinds[topic]](message), stamp, stamp)
+    return left_out
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ SHUT = Sent(0.0, 0.0)
 
 
 def taken_up(demand: float, last: Sent, width: float) -> Sent:
-    """Return what leads the edges to a demand from the last one, through play of a width.
+    """Return what leads the edges to a demand, y2, from the last one, through play of a width, y2.
 
     A demand that stays leaves the command as it is; a shut valve is one without command. Within
     what a valve can be told: at its ends no play is taken up.

@@ -87,6 +87,7 @@ class Balances:
         shown = np.nan_to_num(experiment.outputs[:, 1:], nan=geometry.supply.pT)
         self._shown = np.column_stack([experiment.angle, shown])
         self._smooth_angle, self._rate = _smoothed(experiment.angle, SMOOTHING, period)
+        self._rate_slope = np.gradient(self._rate, period)
         slopes = [_smoothed(column, LAG_SMOOTHING, period)[1] for column in shown.T]
         self._slopes = np.column_stack([self._rate, *slopes])
         p = Plant(geometry).record[0]
@@ -169,8 +170,7 @@ class Balances:
         """
         effects = machine.effects
         angle = self._undelayed(effects, "angle", self._smooth_angle, self._rate)
-        bend = np.gradient(self._rate, self._experiment.period)
-        rate = self._undelayed(effects, "angle", self._rate, bend)
+        rate = self._undelayed(effects, "angle", self._rate, self._rate_slope)
         columns = [
             _unscaled(effects, name, self._undelayed(effects, name, shown, slope))
             for name, shown, slope in zip(

@@ -29,7 +29,7 @@ SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
 ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
 FINE_ACCURACY = 1e-5  # the same of the last fit: flat directions still matter on another recording
 ROUGH = 3e-2  # the same where only the way to the optimum is wanted
-CLOSE = 2.0  # RMS error in units of the noise beyond which flat directions do not matter yet
+POLISHED = 2.0  # RMS error in units of the noise beyond which flat directions do not matter yet
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
 BEHIND = 1.5  # times the error of what a trial has to beat: further off, a fine fit changes nothing
@@ -253,7 +253,7 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
     fine = replace(problem, start=near.x, coarse=None, step=STEP)
-    return known.continued(fit(fine, FINE_ACCURACY if near.misfit <= CLOSE else ACCURACY))
+    return known.continued(fit(fine, FINE_ACCURACY if near.misfit <= POLISHED else ACCURACY))
 
 
 def glimpsed(known: Trial, evidence: Evidence) -> Trial:

@@ -444,8 +444,7 @@ def test_a_steady_move_may_show_a_steady_pressure() -> None:
 
 
 def test_the_same_recording_is_not_given_twice(folder: Path, tmp_path: Path) -> None:
-    for bag in ("a", "a/../a"):
-        (tmp_path / bag).mkdir(exist_ok=True)
+    (tmp_path / "a").mkdir()
     files = folder / "datasheet.yaml", folder / "signals.yaml"
     twice = [tmp_path / "a", tmp_path / "a" / ".." / "a"]
     with pytest.raises(InputError, match="the same recording twice"):

@@ -69,7 +69,7 @@ def test_a_blank_cell_is_no_message(tmp_path: Path, signals: Path) -> None:
     np.testing.assert_allclose(recording["pressure"].time, [0.0, 0.05])
     np.testing.assert_allclose(recording["stroke"].time, [0.0, 0.02, 0.05])
     half = TABLE.replace("20,2.5,0.5", "20,2.5,")
-    import_csv(_table(tmp_path, half), signals, tmp_path / "half")
+    assert import_csv(_table(tmp_path, half), signals, tmp_path / "half").left_out == 1
     recording = load(tmp_path / "half", read_signal_map(signals))
     np.testing.assert_allclose(recording["speed"].time, [0.0, 0.05])
 

@@ -21,6 +21,7 @@ from emir_control.schedule import Schedule
 from emir_control.scheduled_pfc import law_of
 from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant import core, linkage, operating_point
+from emir_plant.effects import linkage_error
 from emir_plant.linearize import linearize
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
@@ -165,7 +166,7 @@ def _static_force(machine: Machine, angle: float, payload: float) -> float:
     """Return the force, N, on which the boom rests at an angle, rad; whether the pump gives it."""
     p = Plant(with_values(machine, {"geometry.payload": payload})).record[0]
     torque = p["mode_weight"][0] * math.cos(angle) / p["mode_joint"][0]
-    return float(torque / linkage.lever_arm(angle, p))
+    return float(torque / linkage_error.lever_arm(angle, p))
 
 
 @dataclass(frozen=True)

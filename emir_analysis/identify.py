@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.signal import lfilter
 
-from emir_analysis import bags
-from emir_analysis.errors import InputError, listed
-from emir_analysis.run_signals import full_name
+from emir_analysis.errors import InputError
+from emir_analysis.graph_topics import GraphTopics, graph_topics
 from emir_analysis.signals import Source, load
 from emir_common.quantity import ParameterError
 from emir_control import design
@@ -57,14 +56,15 @@ def from_recording(bag: Path, output: str, order: int) -> Identified:
     ParameterError for an order that makes no sense.
     """
     topics = (CYLINDER_STATES,) if output == STROKE else (JOINT_STATES, BOOM_DEFLECTION)
-    there = bags.recorded_topics(bag)
+    there = graph_topics(bag)
     sources: dict[str, Source] = {}
     for topic in (VELOCITY_COMMAND, *topics):
-        sources |= _sources(bag, topic, there)
+        sources |= _sources(topic, there)
     recording = load(bag, sources)
     given = recording["velocity_command"]
-    if given.time[-1] - given.time[0] < SHORTEST:
-        raise InputError(f"{bag}: {given.time[-1]:.1f} s: at least {SHORTEST:g} s are needed")
+    length = given.time[-1] - given.time[0]
+    if length < SHORTEST:
+        raise InputError(f"{bag}: {length:.1f} s: at least {SHORTEST:g} s are needed")
     time = np.arange(given.time[0], given.time[-1], CONTROL_PERIOD)
     command = given.value[
         np.searchsorted(given.time, time + 0.5 * CONTROL_PERIOD, side="right") - 1
@@ -77,10 +77,8 @@ def from_recording(bag: Path, output: str, order: int) -> Identified:
         raise InputError(f"{bag}: {error}") from None
 
 
-def _sources(bag: Path, topic: Topic, there: set[str]) -> dict[str, Source]:
-    name = full_name(topic, there)
-    if name is None:
-        raise InputError(f"{bag}: no topic {topic.name}; there are {listed(there)}")
+def _sources(topic: Topic, there: GraphTopics) -> dict[str, Source]:
+    name = there.needed(topic)
     return {signal: Source(name, at.path, at.unit) for signal, at in topic.fields.items()}
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from emir_analysis import bags
 from emir_analysis.control_protocols import Signals
 from emir_analysis.errors import InputError
+from emir_analysis.graph_topics import graph_topics
 from emir_analysis.info import CHANGE
-from emir_analysis.run_signals import full_name_of
 from emir_analysis.switching import Choosing
 from emir_control.waypoints import Waypoints
 from emir_msgs_py.topics import ORDERS
@@ -55,8 +55,7 @@ def orders(bag: Path, node: str) -> list[Order]:
 
     Raises InputError for a parameter that was set without a word from when on.
     """
-    there = bags.recorded_topics(bag)
-    topic = full_name_of(ORDERS, there)
+    topic = graph_topics(bag).full_name(ORDERS)
     found = []
     for message in bags.read(bag, {topic})[topic] if topic else ():
         for status in message.data.status:

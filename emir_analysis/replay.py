@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from emir_analysis import bags
 from emir_analysis.control_protocols import NodeControl, Signals, Stepping
 from emir_analysis.errors import InputError
+from emir_analysis.graph_topics import graph_topics
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import (
     CascadeControl,
@@ -27,7 +27,6 @@ from emir_analysis.recorded_orders import Obedience, orders
 from emir_analysis.recorded_parameters import Values, recorded_nodes, recorded_parameters
 from emir_analysis.replay_plant import replay_plant
 from emir_analysis.robot_replay import replay_robot
-from emir_analysis.run_signals import full_name
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_analysis.switching import Choosing, Ready, Selector, Switch
 from emir_common.parameter_tree import with_values
@@ -71,7 +70,7 @@ def replay(bag: Path, node: str, changed: Mapping[str, Any]) -> list[FieldCompar
     if there and name not in there:
         ran = ", ".join(known for known in NODES if f"{known}_node" in there)
         raise InputError(f"{bag}: {node} was not in this run; it has parameters of {ran}")
-    kind = replay_robot if full_name(TCP_POSE, bags.recorded_topics(bag)) else _replay_joint1
+    kind = replay_robot if graph_topics(bag).full_name(TCP_POSE) else _replay_joint1
     with unpacked(bag, name, recorded_parameters(bag, name)) as values:
         return kind(bag, node, values, changed)
 
@@ -83,9 +82,9 @@ def _replay_joint1(
         return replay_plant(bag, values, changed)
     control = _control(node, {**values, **changed})
     inputs = by_stamp(bag, control.inputs, CONTROL_PERIOD_NS)
-    there, answers = bags.recorded_topics(bag), control.outputs
+    there, answers = graph_topics(bag), control.outputs
     offered = OFFERED_COMMANDS.get(node)
-    standby = offered is not None and full_name(offered, there) is not None
+    standby = offered is not None and there.full_name(offered) is not None
 
     def made(given: Values) -> Stepping:
         return Ready(node, _control(node, given)) if standby else _control(node, given)
@@ -94,9 +93,9 @@ def _replay_joint1(
         _add_applied(inputs, bag, CONTROL_PERIOD_NS)
         commands = VELOCITY_COMMAND, VALVE_COMMAND
         answers = tuple(offered if topic in commands else topic for topic in answers)
-    elif node == "force_loop" and full_name(SELECTOR_TERMS, there):
+    elif node == "force_loop" and there.full_name(SELECTOR_TERMS):
         _add_applied(inputs, bag, 0)
-    kept = tuple(topic for topic in answers if full_name(topic, there))
+    kept = tuple(topic for topic in answers if there.full_name(topic))
     outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
     obedient = Obedience(made, values, changed, orders(bag, f"{node}_node"))
     rows = obedient.answers(sorted(inputs.items()), outputs, CONTROL_PERIOD_NS * 1e-9)

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis import bags
-from emir_analysis.errors import InputError, listed
+from emir_analysis.graph_topics import graph_topics
 from emir_analysis.signals import Recording, Source, load
 from emir_msgs_py.robot_topics import (
     PRESSURES,
@@ -28,7 +27,6 @@ from emir_msgs_py.topics import (
     PRESSURE_LOWERING,
     TRUTH,
     VALVE_COMMAND,
-    Topic,
 )
 
 NEEDED = (CYLINDER_STATES, CYLINDER_REFERENCE, VALVE_COMMAND, PRESSURE_LIFTING, PRESSURE_LOWERING)
@@ -45,36 +43,23 @@ Array = NDArray[np.float64]
 def load_run(path: Path) -> Recording:
     """Read the signals of a run, by the names of the topic table.
 
-    Raises InputError for a recording that lacks a topic of the graph.
+    Raises InputError for a recording that lacks a topic of the graph, or is of several graphs.
     """
-    there = bags.recorded_topics(path)
+    there = graph_topics(path)
     sources: dict[str, Source] = {}
-    robot = full_name(TCP_POSE, there) is not None
+    robot = there.full_name(TCP_POSE) is not None
     needed, optional = (ROBOT_NEEDED, ROBOT_OPTIONAL) if robot else (NEEDED, OPTIONAL)
     for topic in (*needed, *optional):
-        name = full_name(topic, there)
+        name = there.needed(topic) if topic in needed else there.full_name(topic)
         if name is not None:
             fields = topic.fields.items()
             sources |= {signal: Source(name, about.path, about.unit) for signal, about in fields}
-        elif topic in needed:
-            raise InputError(f"{path}: no topic {topic.name}; there are {listed(there)}")
     return load(path, sources)
 
 
 def is_robot(recording: Recording) -> bool:
     """Return whether the run is one of the whole robot."""
     return "tcp_x" in recording.signals
-
-
-def full_name(topic: Topic, there: set[str]) -> str | None:
-    """Return the recorded topic of the table's, whatever its namespace."""
-    return full_name_of(topic.name, there)
-
-
-def full_name_of(relative: str, there: set[str]) -> str | None:
-    """Return the recorded topic with that relative name, whatever its namespace."""
-    found = [name for name in there if name.endswith(f"/{relative}")]
-    return min(found, key=len) if found else None
 
 
 def at(recording: Recording, name: str, times: Array) -> Array:

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis import bags, columns
+from emir_analysis import columns
 from emir_analysis.control_protocols import Signals
-from emir_analysis.errors import InputError, listed
-from emir_analysis.run_signals import full_name
+from emir_analysis.graph_topics import graph_topics
 from emir_msgs_py.topics import Topic
 
 Array = NDArray[np.float64]
@@ -68,14 +67,11 @@ def by_stamp(bag: Path, topics: Sequence[Topic], period: int) -> dict[int, Signa
 
     Raises InputError for a topic that is not recorded or lacks a field.
     """
-    there = bags.recorded_topics(bag)
-    names = {topic.name: full_name(topic, there) for topic in topics}
-    for name, full in names.items():
-        if full is None:
-            raise InputError(f"{bag}: no topic {name}; there are {listed(there)}")
+    there = graph_topics(bag)
+    names = {topic.name: there.needed(topic) for topic in topics}
     paths = {topic.name: [about.path for about in topic.fields.values()] for topic in topics}
-    recorded = columns.read(bag, {full: paths[name] for name, full in names.items() if full})
-    found = [_rows(topic, recorded[names[topic.name] or ""], period) for topic in topics]
+    recorded = columns.read(bag, {full: paths[name] for name, full in names.items()})
+    found = [_rows(topic, recorded[names[topic.name]], period) for topic in topics]
     stamps = set(found[0]).intersection(*found[1:])
     return {
         stamp: {name: value for of_topic in found for name, value in of_topic[stamp].items()}

@@ -1,16 +1,18 @@
 """Steady motion through a posture: the operating points about which the machine is linearized.
 
-The boom turns as a whole, both pressures stand still, the logic block is open. At rest the valve
-is in its dead zone and no command would move anything.
+The boom turns as a whole, the pressures of chambers and supply stand still, the logic block is
+open. At rest the valve is in its dead zone and no command would move anything.
 """
 
 import math
 from collections.abc import Callable
 
+import numpy as np
 from scipy.optimize import root
 
-from emir_plant import core, linkage
+from emir_plant import core
 from emir_plant.core import Array
+from emir_plant.effects import linkage_error
 from emir_plant.plant import Plant, SimulationError
 
 BAR = 1e5
@@ -60,33 +62,43 @@ def under_command(plant: Plant, angle: float, command: float) -> Array:
 def _solution(
     plant: Plant, angle: float, motion: Callable[[float], tuple[float, float]], guess: float
 ) -> tuple[Array, float] | None:
-    """Return the state at which both pressures stand still, and the command; None if there is none.
+    """Return the steady state and the command; None if there is none.
 
-    motion: from the unknown beside the lowering chamber's pressure to velocity and command.
-    Raises SimulationError as `Plant.initial`.
+    motion: from the second unknown to velocity and command. The others, bar: the lowering
+    chamber's pressure, what friction adds to that of the lifting one, and where the supply sags,
+    by how much. Raises SimulationError as `Plant.initial`.
     """
+    turning = core.MODES + plant.record[0]["mode_joint"].size
+    still, units = [core.P_H, core.P_S, turning], [BAR, BAR, 1.0]
+    if plant.machine.effects.supply_pressure_droop.resistance:
+        still, units = [*still, core.DROOP], [*units, BAR]
+
+    def state(unknown: Array) -> tuple[Array, float]:
+        velocity, command = motion(float(unknown[1]))
+        return _state(plant, angle, unknown, velocity, command), command
 
     def rates(unknown: Array) -> Array:
-        velocity, command = motion(float(unknown[1]))
-        state = _state(plant, angle, float(unknown[0]) * BAR, velocity, command)
-        return plant.derivative(state, command)[[core.P_H, core.P_S]] / BAR
+        return np.asarray(plant.derivative(*state(unknown))[still] / units)
 
     plant.initial(angle)  # says so where the cylinder cannot hold the boom at all
+    others = [0.0] * (len(still) - 2)
     for pressure in GUESSES:
         try:
-            found = root(rates, [pressure, guess])
+            found = root(rates, [pressure, guess, *others])
         except SimulationError:  # on the way to a pressure that the cylinder cannot have
             continue
         if found.success and found.x[0] >= 0.0:
-            velocity, command = motion(float(found.x[1]))
-            return _state(plant, angle, float(found.x[0]) * BAR, velocity, command), command
+            return state(found.x)
     return None
 
 
-def _state(plant: Plant, angle: float, pressure: float, velocity: float, command: float) -> Array:
+def _state(plant: Plant, angle: float, unknown: Array, velocity: float, command: float) -> Array:
     p = plant.record[0]
-    x = plant.initial(angle, pressure)
+    lowering, _, more, *sagging = unknown * BAR
+    x = plant.initial(angle, lowering)
+    x[core.P_H] += more
+    x[core.DROOP] = sum(sagging)
     x[core.SPOOL], x[core.LOGIC] = command, 1.0
-    rate = velocity / linkage.lever_arm(angle, p)
+    rate = velocity / linkage_error.lever_arm(angle, p)
     x[core.MODES + p["mode_joint"].size] = rate / p["mode_joint"][0]
     return x

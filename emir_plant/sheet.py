@@ -63,7 +63,7 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
     headings. Raises ParameterError, naming file and key and what is allowed, for a file that
     cannot be read, a missing or unknown key, another unit, a value outside its range.
     """
-    content = _of_plant_node(read_map(path, what="parameters"))
+    content = _nested(_of_plant_node(read_map(path, what="parameters")))
     base = content.pop(BASED_ON, None)
     if base is not None:
         content = _over(_base(path, base), content)
@@ -75,7 +75,7 @@ def load_sheet(path: Path, *, strict: bool = False) -> Sheet:
 
 def _base(path: Path, name: Any) -> dict[str, Any]:
     file = path.parent / str(name)
-    content = read_map(file, what="parameters")
+    content = _nested(read_map(file, what="parameters"))
     if BASED_ON in content:
         raise ParameterError(f"{path}: {BASED_ON}: {file} is itself based on another")
     return content
@@ -93,6 +93,15 @@ def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def _nested(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a map with `group.name: entry` written out as `group: {name: entry}`."""
+    found: dict[str, Any] = {}
+    for path, entry in content.items():
+        group, _, name = str(path).partition(".")
+        found = _over(found, {group: _nested({name: entry}) if name else entry})
+    return found
+
+
 def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     entries = {
         f"{group}.{name}": entry
@@ -107,8 +116,9 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         for name, about in quantities(kind).items()
     }
     unknown = [path for path in entries if path not in known]
-    headings = [name for name, entry in content.items() if not isinstance(entry, dict)]
-    _check_names(entries, known, headings, strict=strict)
+    headings = {name: entry for name, entry in content.items() if not isinstance(entry, dict)}
+    numbers = [name for name, entry in headings.items() if isinstance(entry, int | float)]
+    _check_names(entries, known, numbers if not strict else headings, strict=strict)
     stated = {path: entries[path] for path in known if path in entries}
     values = {path: _stated(path, entry, known[path]) for path, entry in stated.items()}
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}
@@ -121,22 +131,27 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
         machine=Machine(**groups, effects=effects),
         tolerances={path: _tolerance(e, path) for path, e in stated.items() if "tol" in e},
         sources={path: str(e["source"]) for path, e in stated.items() if "source" in e},
-        ignored=(*unknown, *unread),
+        ignored=(*unknown, *unread, *numbers),
     )
 
 
 def _check_names(
-    entries: Collection[str], known: Collection[str], headings: list[str], *, strict: bool
+    entries: Collection[str], known: Collection[str], headings: Collection[str], *, strict: bool
 ) -> None:
     """Raise ParameterError for an entry, by dotted path, that is no parameter and may not stand.
 
-    headings: what stands in the file beside groups of entries. strict: as for `load_sheet`.
+    headings: what stands in the file beside groups of entries, numbers where headings may stand.
+    strict: as for `load_sheet`.
     """
     unknown = [path for path in entries if path not in known]
     for path in unknown:
         near = get_close_matches(path, known, n=1, cutoff=SAME)
         if path.startswith(MORE_TOLD) and near and near[0] not in entries:
             raise ParameterError(f"{path}: there is no such parameter; is {near[0]} meant?")
+    for heading in headings:
+        meant = [path for path in known if path.rpartition(".")[2] == heading]
+        if meant:
+            raise ParameterError(f"{heading}: is {meant[0]} meant?")
     wrong = [path for path in unknown if strict or not path.startswith(MORE_TOLD)]
     for path in [*wrong, *(headings if strict else [])]:
         raise ParameterError(f"{path}: there is no such parameter; {_there_are(path, known)}")
@@ -169,9 +184,9 @@ def _there_are(path: str, known: Iterable[str]) -> str:
 
 def _of_plant_node(content: dict[str, Any]) -> dict[str, Any]:
     """Return the machine's groups where they stand as ROS 2 parameters of the plant node."""
-    for name in ("/**/plant_node", "plant_node"):
-        node = content.get(name)
-        if isinstance(node, dict) and isinstance(node.get("ros__parameters"), dict):
+    for name, node in content.items():
+        of_plant = str(name).rpartition("/")[2] == "plant_node"
+        if of_plant and isinstance(node, dict) and isinstance(node.get("ros__parameters"), dict):
             return dict(node["ros__parameters"])
     return content
 

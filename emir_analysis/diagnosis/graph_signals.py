@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from emir_analysis.bags import recorded_topics
 from emir_analysis.diagnosis.experiment import ANGLE, COMMAND, PRESSURE_LOWERING, STROKE
 from emir_analysis.errors import InputError
-from emir_analysis.run_signals import full_name
+from emir_analysis.graph_topics import graph_topics
 from emir_analysis.signals import Source
 from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
@@ -34,16 +33,16 @@ def graph_signals(path: Path) -> dict[str, Source]:
     Raises InputError for a recording of the whole robot, or one that lacks a topic and so is of
     something else than the graph.
     """
-    there = recorded_topics(path)
-    if full_name(TCP_POSE, there) is not None:
+    there = graph_topics(path)
+    if there.full_name(TCP_POSE) is not None:
         raise InputError(f"{path}: of the whole robot; record joint 1 (`emir run --model joint1`)")
     sources = {}
     for signal, (topic, field) in SENSED.items():
-        name = full_name(topic, there)
+        name = there.full_name(topic)
         if name is None:
             raise InputError(
                 f"{path}: no topic {topic.name}, so not of the graph; say with --signals which"
-                f" topic carries what; there are {', '.join(sorted(there))}"
+                f" topic carries what; there are {', '.join(sorted(there.names))}"
             )
         sources[signal] = Source(name, topic.fields[field].path, topic.fields[field].unit)
     return sources

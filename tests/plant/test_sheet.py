@@ -3,13 +3,14 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
 from emir_plant.effects import Effects
 from emir_plant.hydraulics import chambers
 from emir_plant.plant import Plant
-from emir_plant.sheet import even_edges, joint1, load_sheet
+from emir_plant.sheet import data, even_edges, joint1, load_sheet
 
 FILE = Path(__file__).parents[2] / "emir_plant" / "data" / "joint1.yaml"
 
@@ -143,3 +144,36 @@ def test_what_the_data_sheet_does_not_mention_is_not_there(shared: Path) -> None
     assert sheet.machine.effects == Effects()
     assert sheet.machine.logic_block.pilot == 0  # "threshold ... on p_H"
     assert chambers.relief_flow(1e8, Plant(sheet.machine).record[0]) == 0.0
+
+
+def test_a_dotted_name_is_its_group_and_name(tmp_path: Path) -> None:
+    file = tmp_path / "rig.yaml"
+    file.write_text(
+        f"based_on: {data('joint1.yaml')}\n"
+        "geometry.payload: {value: 900.0, unit: kg, tol: 0.1}\n"
+        "effects.coulomb_friction.force: 5000.0\n",
+        encoding="utf-8",
+    )
+    sheet = load_sheet(file)
+    assert sheet.machine.geometry.payload == 900.0
+    assert sheet.machine.effects.coulomb_friction.force == 5000.0
+    assert sheet.tolerances["geometry.payload"] == 0.1
+
+
+def test_a_number_without_its_group_is_not_dropped(tmp_path: Path) -> None:
+    file = tmp_path / "rig.yaml"
+    file.write_text(f"based_on: {data('joint1.yaml')}\npayload: 900.0\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"payload: is geometry.payload meant"):
+        load_sheet(file)
+    file.write_text(f"based_on: {data('joint1.yaml')}\nserial: 17\n", encoding="utf-8")
+    assert "serial" in load_sheet(file).ignored
+
+
+@pytest.mark.parametrize("node", ["plant_node", "/plant_node", "/rig/plant_node"])
+def test_what_ros_2_dumps_of_the_plant_node_is_a_machine(node: str, tmp_path: Path) -> None:
+    machine = with_values(joint1(), {"geometry.payload": 900.0})
+    values = {path: value for path, (_, value) in declared(machine).items()}
+    told = {path: list(v) if isinstance(v, tuple) else v for path, v in values.items()}
+    file = tmp_path / "dump.yaml"
+    file.write_text(yaml.safe_dump({node: {"ros__parameters": told}}), encoding="utf-8")
+    assert load_sheet(file).machine == machine

@@ -1,8 +1,7 @@
 """`emir compare`: every controller on the same moves, as one table and one picture."""
 
-import math
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +20,15 @@ from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1
 
 NO_CSV = "--csv is of a grid: of more than one case"
+DEFAULTS = {
+    "angle": None, "payload": None, "size": None, "error": None, "trajectory": "lift-lower",
+    "repeat": 1, "csv": None,
+}  # fmt: skip
+OF_CONTROLLERS = {"controllers": None, "pfc": None, "pfc_tip": None}
+MODES = {  # and what they have no use for
+    "damping": DEFAULTS | OF_CONTROLLERS | {"trade_off": False},
+    "trade_off": DEFAULTS,
+}
 
 Progress = Callable[[str], None]
 
@@ -33,8 +41,9 @@ def command(options: Namespace, progress: Progress) -> str:
     """
     check_outputs([options.picture, options.csv], None, [options.pfc, options.pfc_tip])
     check_picture(options.picture)
-    if options.csv and (options.damping or options.trade_off):
-        raise InputError(NO_CSV)
+    for mode, usual in MODES.items():
+        if getattr(options, mode):
+            _check_nothing_else(options, mode, usual)
     if options.damping:
         if options.picture:
             save(damping.picture(joint1()), options.picture)
@@ -48,11 +57,25 @@ def command(options: Namespace, progress: Progress) -> str:
         return trade_off.as_text(curve)
     chosen = select(_known(options), options.controllers)
     cases = _cases(options)
+    if named(options.trajectory, TrajectoryParameters()).parameters.distance == 0.0:
+        raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
     if len(cases) > 1:
         return _grid(chosen, cases, options, progress)
     if options.csv:
         raise InputError(NO_CSV)
     return _one(chosen, cases[0], options, progress)
+
+
+def _check_nothing_else(options: Namespace, mode: str, usual: Mapping[str, object]) -> None:
+    """Raise InputError for an option that a mode has no use for; usual: the defaults of these."""
+    given = [name for name, value in usual.items() if getattr(options, name) != value]
+    if given:
+        names = ", ".join(_as_option(name) for name in given)
+        raise InputError(f"{names}: not with {_as_option(mode)}")
+
+
+def _as_option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _known(options: Namespace) -> dict[str, Stepping]:
@@ -86,7 +109,7 @@ def _grid(
 ) -> str:
     if options.repeat > 1:
         raise InputError("--repeat is for one case: a grid varies enough")
-    found, left_out = compare_grid.results(joint1(), chosen, cases, progress)
+    found, left_out = compare_grid.results(joint1(), chosen, cases, progress, options.trajectory)
     if options.picture:
         save(compare_grid.picture(found), options.picture)
     if options.csv:
@@ -110,20 +133,17 @@ def select(known: dict[str, Stepping], names: list[str] | None) -> dict[str, Ste
 
 def _one(chosen: dict[str, Stepping], case: Case, options: Namespace, progress: Progress) -> str:
     """Return the table of one case."""
-    title = f"{case.angle:g} deg, {case.payload:g} kg"
+    title = str(case)
     machine = case.machine(joint1())
     given = TrajectoryParameters(distance=case.size * 1e-3)
     trajectory = named(options.trajectory, given)
-    if trajectory.parameters.distance == 0.0:
-        raise ParameterError(f"trajectory {options.trajectory!r}: nothing moves in it")
     for line in cautions(machine):
         progress(line)
     runs: dict[str, list[Run]] = {}
     try:
         for name, outer in chosen.items():
             progress(f"{title}: {name}")
-            start = math.radians(case.angle)
-            runs[name] = list(repeated(machine, trajectory, outer, start, options.repeat))
+            runs[name] = list(repeated(machine, trajectory, outer, case.start, options.repeat))
     except SimulationError as error:
         raise InputError(f"{title}: {error}") from None
     if options.picture:

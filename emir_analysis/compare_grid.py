@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from emir_analysis.compare import MoveFigures, direction, figures, moves, run
+from emir_analysis.compare import MoveFigures, Run, direction, figures, moves, run
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.errors import InputError
@@ -22,7 +22,7 @@ from emir_analysis.margin import gain_margin, linear_machine
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
-from emir_control.trajectory import TrajectoryParameters, named
+from emir_control.trajectory import AwayAndBack, TrajectoryParameters, named
 from emir_plant.parameters import Machine
 from emir_plant.plant import SimulationError
 
@@ -57,6 +57,11 @@ class Case:
         where = f"{self.angle:g} deg, {self.payload:g} kg, {self.size:g} mm"
         return f"{where}, model error {self.error}"
 
+    @property
+    def start(self) -> float:
+        """Return the boom's angle at the start, rad."""
+        return math.radians(self.angle)
+
     def machine(self, base: Machine) -> Machine:
         """Return the machine of this case."""
         table = declared(base)
@@ -88,8 +93,9 @@ def results(
     controllers: Mapping[str, Stepping],
     cases: Sequence[Case],
     progress: Callable[[str], None],
+    trajectory: str = "lift-lower",
 ) -> tuple[list[Result], list[str]]:
-    """Return each move of each controller in each case that the machine can do.
+    """Return each move of each controller in each case that the machine can do with all of them.
 
     Also, in words, the cases that it cannot do. Raises InputError where it can do none.
     """
@@ -98,27 +104,30 @@ def results(
     margins: dict[tuple[object, ...], dict[str, float]] = {}
     for k, case in enumerate(cases, 1):
         progress(f"{k} of {len(cases)}: {case}")
+        of_case: list[Result] = []
         try:
             for name, outer in controllers.items():
                 same = name, case.angle, case.payload, case.error  # whatever the size
                 if same not in margins:
                     margins[same] = _margins(case, base, outer)
-                found += _of_case(base, name, outer, case, margins[same])
+                signals = run(case.machine(base), _moves(trajectory, case), outer, case.start)
+                of_case += _results(signals, name, case, margins[same])
         except SimulationError as error:
             progress(f"  left out: {error}")
             left_out.append(f"{case}: {error}")
+        else:
+            found += of_case
     if not found:
         raise InputError(f"no case that the machine can do; the first: {left_out[0]}")
     return found, left_out
 
 
-def _of_case(
-    base: Machine, name: str, outer: Stepping, case: Case, margins: dict[str, float]
-) -> Iterator[Result]:
+def _moves(trajectory: str, case: Case) -> AwayAndBack:
     ramp = 0.75 * min(1.0, math.sqrt(case.size / 63.75))  # s: a short move is a quick one
-    given = TrajectoryParameters(distance=case.size * 1e-3, ramp=ramp)
-    trajectory = named("lift-lower", given)
-    signals = run(case.machine(base), trajectory, outer, math.radians(case.angle))
+    return named(trajectory, TrajectoryParameters(distance=case.size * 1e-3, ramp=ramp))
+
+
+def _results(signals: Run, name: str, case: Case, margins: Mapping[str, float]) -> Iterator[Result]:
     velocity = signals["reference_velocity"]
     for move, found in zip(moves(velocity), figures(signals), strict=True):
         way = direction(velocity[move])

@@ -2,7 +2,7 @@
 
 import math
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from emir_analysis import design_lqg
@@ -38,29 +38,31 @@ OF_PFC = {
     "order": None, "angle": 45.0, "payload": 0.0, "observer": 0.0, "schedule": False,
     "coincidence": None, "response_time": None, "picture": None,
 }  # fmt: skip
+OF_LQG = {"oil_tolerance": 0.2}
 COMPARED = (0.1, 0.3, 0.5, 0.7)  # Hz
 
 
 def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
     """Design, check, write the file; return what to tell. Raises InputError, ParameterError."""
     options = _parser().parse_args(words)
-    source = Path(options.machine)
-    check_outputs([options.out, options.picture], None, [source])
+    check_outputs([options.out, options.picture], None, [options.machine])
     check_picture(options.picture)
-    recorded = _is_recording(source)
+    recorded = _is_recording(options.machine)
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
             raise InputError(f"--controller {options.controller}: a machine's YAML is needed")
-        _check_nothing_else(options)
+        _check_nothing_else(options, OF_PFC, "pfc and pfc_tip")
         return design_lqg.command(_machine(options.machine), options, progress)
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
         raise ParameterError(f"controller {options.controller!r}: there are {known}")
+    _check_nothing_else(options, OF_LQG, "lqg and mpc")
     return _pfc(options, progress, recorded=recorded)
 
 
 def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool) -> str:
     """As `command`, of a predictive controller; recorded: from a recording."""
+    source = options.machine or "joint 1"
     if not 0.0 <= options.observer < math.inf:
         raise ParameterError(f"observer = {options.observer:g} m/s: has to be 0 or more")
     output = OUTPUTS[options.controller]
@@ -78,13 +80,13 @@ def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool)
     found_model = ""
     try:
         if recorded:
-            parameters, found_model = _identified(Path(options.machine), machine, task, options)
+            parameters, found_model = _identified(options.machine, machine, task, options)
         elif options.schedule:
             parameters = scheduled(machine, task, ANGLES, PAYLOADS)
         else:
             parameters = design_pfc(machine, task)
     except SimulationError as error:
-        raise InputError(f"{options.machine}: {error}") from None
+        raise InputError(f"{source}: {error}") from None
     pfc_file.save(options.out, parameters, output, _made_by(options, task))
     progress("stability over posture and payload")
     found = stability_map(machine, options.controller, parameters)
@@ -101,7 +103,7 @@ def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool)
 def _parser() -> ArgumentParser:
     parser = ArgumentParser(prog="emir design")
     parser.add_argument(
-        "--from", dest="machine", metavar="MODEL|BAG", default="joint1",
+        "--from", dest="machine", metavar="MODEL|BAG", type=Path,
         help="YAML of the machine or recording of a run; default: EMIR's joint 1",
     )  # fmt: skip
     parser.add_argument("--controller", default="pfc", help="pfc (default), pfc_tip, lqg, mpc")
@@ -121,7 +123,7 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--coincidence", type=int, nargs="+", metavar="H", help="samples ahead")
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
     parser.add_argument(
-        "--oil-tolerance", type=float, default=0.2, metavar="X",
+        "--oil-tolerance", type=float, default=OF_LQG["oil_tolerance"], metavar="X",
         help="of lqg and mpc: by how much the oil's stiffness may differ from the stated one",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
@@ -129,20 +131,20 @@ def _parser() -> ArgumentParser:
     return parser
 
 
-def _check_nothing_else(options: Namespace) -> None:
-    """Raise InputError for an option that a design of lqg or mpc has no use for."""
-    given = {name for name, usual in OF_PFC.items() if getattr(options, name) != usual}
+def _check_nothing_else(options: Namespace, others: Mapping[str, object], whose: str) -> None:
+    """Raise InputError for an option, of others with their defaults, that a design does not use."""
+    given = {name for name, usual in others.items() if getattr(options, name) != usual}
     if given:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(given))
-        raise InputError(f"{names}: of pfc and pfc_tip, not of {options.controller}")
+        raise InputError(f"{names}: of {whose}, not of {options.controller}")
 
 
 def _order(given: int | None, usual: int) -> int:
     return usual if given is None else given
 
 
-def _is_recording(path: Path) -> bool:
-    return path.is_dir() or path.suffix == ".mcap"
+def _is_recording(path: Path | None) -> bool:
+    return path is not None and (path.is_dir() or path.suffix == ".mcap")
 
 
 def _identified(
@@ -162,8 +164,8 @@ def _identified(
     )
 
 
-def _machine(name: str) -> Machine:
-    return joint1() if name == "joint1" else load_sheet(Path(name)).machine
+def _machine(file: Path | None) -> Machine:
+    return joint1() if file is None else load_sheet(file).machine
 
 
 def _tuning(options: Namespace) -> dict[str, object]:
@@ -174,12 +176,17 @@ def _tuning(options: Namespace) -> dict[str, object]:
 
 
 def _made_by(options: Namespace, task: DesignTask) -> dict[str, str]:
-    words = [f"--from {options.machine}", f"--controller {task.controller}"]
+    words = [f"--from {options.machine}"] if options.machine else []
+    words += [f"--controller {task.controller}"]
     words += [f"--order {task.order}", f"--angle {options.angle:g}"]
     words += ["--schedule"] if options.schedule else []
     words += [f"--payload {options.payload:g}", f"--observer {options.observer:g}"]
+    if options.coincidence:
+        words.append(f"--coincidence {' '.join(map(str, options.coincidence))}")
+    if options.response_time is not None:
+        words.append(f"--response-time {options.response_time:g}")
     made_by = {"command": f"emir design {' '.join(words)}"}
-    if not _is_recording(Path(options.machine)):
+    if not _is_recording(options.machine):
         slow = f"piston velocity {task.point.velocity:g} m/s, force loop closed"
         made_by["linearized at"] = slow
     return made_by

@@ -61,7 +61,8 @@ def _parameters(machine: Machine) -> LqgParameters:
 
 
 def _write(options: Namespace, values: dict[str, float]) -> None:
-    words = f"--from {options.machine} --controller {options.controller}"
+    source = f"--from {options.machine} " if options.machine else ""
+    words = f"{source}--controller {options.controller}"
     made_by = f"# emir design {words} --oil-tolerance {options.oil_tolerance:g}\n"
     file, content = options.out, {f"{options.controller}_node": {"ros__parameters": values}}
     write_text(file, made_by + yaml.safe_dump(content))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from emir_analysis.cli import main
 from emir_analysis.closed_loop import ClosedLoop
@@ -146,6 +147,10 @@ def test_design_command_writes_file_and_picture_and_says_where_it_is_stable(
     assert "lifting" in said
     assert "1500 kg" in said
     assert pfc_file.load(file, "stroke").coincidence == (10, 20)
+    # the file says how it is made again
+    told, again = yaml.safe_load(file.read_text())["made_by"]["command"], tmp_path / "again.yaml"
+    assert main([*told.removeprefix("emir ").split(), "--out", str(again)]) == 0
+    assert again.read_text() == file.read_text()
     assert image.read_bytes().startswith(b"\x89PNG")
 
 
@@ -159,8 +164,9 @@ def test_design_command_writes_file_and_picture_and_says_where_it_is_stable(
         (["--observer", "nan"], "observer = nan m/s: has to be 0 or more"),
         (["--from", "nowhere.yaml"], "nowhere.yaml: No such file"),
         (["--angle", "200"], "angle = 3.49"),
-        (["--payload", "3000", "--angle", "20"], "design: joint1: at 20.0 deg the boom needs"),
+        (["--payload", "3000", "--angle", "20"], "design: joint 1: at 20.0 deg the boom needs"),
         (["--coincidence", "25"], "rising numbers from 1 to 20"),
+        (["--oil-tolerance", "0.1"], "--oil-tolerance: of lqg and mpc, not of pfc"),
     ],
 )
 def test_bad_input_is_one_clear_line(
@@ -174,3 +180,11 @@ def test_bad_input_is_one_clear_line(
     assert len(errors) == 1
     assert re.search(said, errors[0])
     assert not file.exists()
+
+
+def test_a_folder_called_as_the_joint_is_no_recording_to_design_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "joint1").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert main(["design", "--out", str(tmp_path / "pfc.yaml")]) == 0

@@ -147,10 +147,12 @@ class Balances:
         return result
 
     def one_step(self, machine: Machine) -> Array:
-        """Return measured minus predicted outputs, (n - 1, 4), SI units, one sample ahead.
+        """Return measured minus modelled change of the outputs, (n - 1, 4), SI units, in a sample.
 
-        From the measured state before, with what no sensor shows followed as for the balances.
-        The stroke goes on with the measured velocity, whatever the model.
+        Every term of the model takes the measured signals, the velocity as it is smoothed over
+        both sides: what the model says of a step, not what it could foresee. What no sensor shows
+        is followed as for the balances. The stroke goes on with the measured velocity, whatever
+        the model.
         """
         result = np.full((self._experiment.angle.size - 1, len(OUTPUTS)), np.nan)
         true = self._undistorted(machine)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.signals import Array
 
 ORDERS = (1, 2, 3, 4, 6)
@@ -34,13 +34,11 @@ class BlackBox:
 
     def free_run(self, experiment: Experiment) -> Array:
         """Return the outputs, (n, c), under the recorded command alone from the first samples."""
-        outputs, inputs, every = _sampled(experiment, self)
+        outputs, inputs, time = _sampled(experiment, self)
         y = np.tile(outputs[0], (len(outputs), 1))
         for k in range(self.order, len(outputs)):
             y[k] = np.clip(_row(y, inputs, k, self.order) @ self.weights, -FAR, FAR)
-        coarse = np.arange(len(outputs)) * every
-        fine = np.arange(len(experiment.angle))
-        columns = [np.interp(fine, coarse, column) for column in y.T]
+        columns = [np.interp(experiment.time, time, column) for column in y.T]
         return np.asarray(np.column_stack(columns) * self.spread + self.mean)
 
     def one_step(self, experiment: Experiment) -> Array:
@@ -72,8 +70,8 @@ def train(evidence: Evidence) -> BlackBox:
 
 
 def train_one_step(evidence: Evidence) -> BlackBox:
-    """Train the same at the sensors' own rate, for predicting one sample ahead."""
-    period = evidence.experiments[0].period
+    """Train the same at the sensors' own rate, the slowest, for predicting one sample ahead."""
+    period = max(experiment.period for experiment in evidence.experiments)
     return _fitted(list(evidence.experiments), evidence, max(ORDERS), period)
 
 
@@ -99,18 +97,20 @@ def _shown(experiment: Experiment, evidence: Evidence) -> Array:
     return experiment.outputs[:, evidence.shown]
 
 
-def _sampled(experiment: Experiment, model: BlackBox) -> tuple[Array, Array, int]:
-    """Return scaled outputs (k, c) and inputs (k, 1) on the model's period, and its samples."""
-    every = max(1, round(model.period / experiment.period))
+def _sampled(experiment: Experiment, model: BlackBox) -> tuple[Array, Array, Array]:
+    """Return scaled outputs (k, c) and inputs (k, 1) on the model's period, and its times (k,)."""
+    time = np.arange(0.0, experiment.time[-1] + 1e-9, model.period)
     shown = experiment.outputs[:, ~np.all(np.isnan(experiment.outputs), axis=0)]
-    outputs = ((shown - model.mean) / model.spread)[::every]
+    columns = [np.interp(time, experiment.time, column) for column in shown.T]
+    outputs = (np.column_stack(columns) - model.mean) / model.spread
     beyond = np.sign(experiment.commands) * np.maximum(
         np.abs(experiment.commands) - model.dead_zone, 0.0
     )
     total = np.concatenate([[0.0], np.cumsum(beyond)])
-    ends = np.minimum(np.arange(len(outputs) + 1) * every * experiment.every, beyond.size)
+    steps = round(model.period / COMMAND_STEP)
+    ends = np.minimum(np.arange(len(outputs) + 1) * steps, beyond.size)
     length = np.maximum(np.diff(ends), 1)
-    return outputs, (np.diff(total[ends]) / length)[:, None], every
+    return outputs, (np.diff(total[ends]) / length)[:, None], time
 
 
 def _row(outputs: Array, inputs: Array, k: int, order: int) -> Array:

@@ -103,9 +103,12 @@ class Evidence:
         """Return those residuals, (m, w, 5), that are fitted, (m, n), in units of a floor, (5,)."""
         return np.asarray((residuals / floor)[:, :, self.fitted].reshape(len(residuals), -1))
 
-    def one_step(self, machine: Machine) -> Array:
-        """Return measured minus predicted, (n, 4), SI units, one sample ahead of measured ones."""
-        return np.concatenate([balances.one_step(machine) for balances in self._balances])
+    def one_step(self, machine: Machine) -> list[Array]:
+        """Return measured minus predicted, (n, 4), SI units, of each recording's samples.
+
+        As `Balances.one_step`.
+        """
+        return [balances.one_step(machine) for balances in self._balances]
 
     @property
     def velocity(self) -> Array:

@@ -76,8 +76,14 @@ def rms(error: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(np.square(error), axis=0)))
 
 
-def block_medians(error: Array, period: float, block: float = 15.0) -> Array:
-    """Return the median over blocks, s, of each column's RMS: one late stick does not decide."""
-    size = max(1, round(block / period))
-    blocks = [error[k : k + size] for k in range(0, len(error) - size // 2, size)]
-    return np.asarray(np.median([rms(part) for part in blocks], axis=0))
+def block_medians(errors: Sequence[Array], periods: Sequence[float], block: float = 15.0) -> Array:
+    """Return the median over blocks, s, of each column's RMS: one late stick does not decide.
+
+    errors: (n, c) of each recording, sampled every period, s.
+    """
+    blocks = []
+    for error, period in zip(errors, periods, strict=True):
+        size = max(1, round(block / period))
+        starts = range(0, max(len(error) - size // 2, 1), size)
+        blocks += [rms(error[k : k + size]) for k in starts]
+    return np.asarray(np.median(blocks, axis=0))

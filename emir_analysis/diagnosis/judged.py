@@ -30,7 +30,7 @@ class Judged:
     """What each model says of the judge recordings.
 
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
-    errors (n, 4) of predicting one sample ahead from measured ones, all recordings in one.
+    errors (n, 4) of predicting one sample ahead from measured ones in each recording.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
     surprising: what was found does not explain them. reconciled: nothing was found missing, and
     other parameters inside the tolerances explain them and the recordings that were fitted.
@@ -38,7 +38,7 @@ class Judged:
 
     evidence: Evidence
     runs: dict[str, list[Array]]
-    one_step: dict[str, Array]
+    one_step: dict[str, list[Array]]
     surprising: bool
     reconciled: bool
 
@@ -71,9 +71,7 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     free = black_box.train(findings.evidence)
     ahead = black_box.train_one_step(findings.evidence)
     runs[BLACK_BOX] = [_spread(free.free_run(e), evidence) for e in evidence.experiments]
-    one_step[BLACK_BOX] = np.concatenate(
-        [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
-    )
+    one_step[BLACK_BOX] = [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
     surprising = not explained(findings.chosen, evidence)
     reconciled = surprising and findings.verdict == "nothing_missing"
     reconciled = reconciled and _reconciled(findings, evidence)

@@ -7,6 +7,7 @@ import numpy as np
 from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.error_tests import ErrorTests
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
     SHOWN,
@@ -19,7 +20,6 @@ from emir_analysis.diagnosis.pictures import (
 from emir_analysis.diagnosis.result import (
     Diagnosis,
     EffectResult,
-    ErrorTests,
     ParameterResult,
     SignalResult,
 )
@@ -273,7 +273,8 @@ def error_tests(
             columns,
             rows,
             "low, high: the free run's RMS error in units of the noise, 95 % by block bootstrap. "
-            "one step: error one sample ahead of measured ones, in units of its noise. whiteness: "
+            "one step: error of the modelled change from one sample to the next, all else as "
+            "measured (black box: from earlier samples alone), in units of its noise. whiteness: "
             "Ljung-Box statistic of the one-step error over its 95 % value, white below 1. input: "
             "largest correlation of the free run's error with the command.",
         ),

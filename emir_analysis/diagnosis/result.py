@@ -14,25 +14,23 @@ from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.error_tests import ErrorTests, error_tests
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians, rms
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
-from emir_analysis.diagnosis.statistics import (
-    Interval,
-    input_correlation,
-    rms_intervals,
-    whiteness,
-)
+from emir_analysis.diagnosis.statistics import BLOCK, PERIODS
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import between_steps, open_shares, untold
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
-from emir_plant.effects import REGISTRY
+from emir_plant.effects import REGISTRY, Effects
+from emir_plant.linearize import linearize
+from emir_plant.plant import Plant, SimulationError
 from emir_plant.unnamed import UNNAMED
 
 if TYPE_CHECKING:
@@ -43,7 +41,6 @@ FEWEST_DIGITS = 3
 OPEN = "not determined by the recording"
 SET = "set: as good as fitted"
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
-SLOW_PERIOD = 1.4  # s, of joint 1 on its oil; over two of them the tests of errors look back
 
 
 @dataclass(frozen=True)
@@ -130,20 +127,6 @@ class SignalResult:
 
 
 @dataclass(frozen=True)
-class ErrorTests:
-    """How sure a signal's free-run error is and what it still knows, by stage.
-
-    intervals: of the RMS, 95 %, by block bootstrap. input_correlation: largest correlation of
-    the free run's error with the command. whiteness: Ljung-Box statistic of the one-step error
-    over its 95 % value; below 1 it is white.
-    """
-
-    intervals: dict[str, Interval]
-    input_correlation: dict[str, float]
-    whiteness: dict[str, float]
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """What a recording's machine lacks in the model, and the error before and after.
 
@@ -186,9 +169,9 @@ def diagnosis(
     findings: Findings, judged: Judged, control: dict[str, ControlResult] | None = None
 ) -> Diagnosis:
     """Put the findings into numbers, judged on recordings that no fit has seen."""
-    period = judged.evidence.experiments[0].period
     stages = (*STAGES, BLACK_BOX)
-    whole = {stage: np.concatenate(judged.errors(stage)) for stage in stages}
+    errors = {stage: judged.errors(stage) for stage in stages}
+    periods = [experiment.period for experiment in judged.evidence.experiments]
     fitted = _parameters(findings.chosen, findings.evidence)
     return Diagnosis(
         verdict=verdict(findings, judged),
@@ -200,10 +183,12 @@ def diagnosis(
         tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
         balances=_balances(findings),
-        signals=_signals(findings, {s: rms(error) for s, error in whole.items()}),
-        block_medians=_signals(findings, {s: block_medians(e, period) for s, e in whole.items()}),
-        one_step=_signals(findings, {s: rms(judged.one_step[s]) for s in stages}, _STEP_NOISE),
-        tests=_tests(judged, whole, period),
+        signals=_signals(findings, {s: rms(np.concatenate(e)) for s, e in errors.items()}),
+        block_medians=_signals(findings, {s: block_medians(e, periods) for s, e in errors.items()}),
+        one_step=_signals(
+            findings, {s: rms(np.concatenate(judged.one_step[s])) for s in stages}, _STEP_NOISE
+        ),
+        tests=error_tests(judged, _slow_period(findings)),
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},
         shape=findings.shape,
         swing=findings.swing,
@@ -329,28 +314,19 @@ def _signals(
     }
 
 
-def _tests(judged: Judged, whole: dict[str, Array], period: float) -> dict[str, ErrorTests]:
-    experiments = judged.evidence.experiments
-    command = np.concatenate(
-        [np.append(e.commands, e.commands[-1])[:: e.every] for e in experiments]
-    )
-    intervals = {stage: rms_intervals(error, period) for stage, error in whole.items()}
-    result = {}
-    for k, name in enumerate(OUTPUTS):
-        if not judged.evidence.shown[k]:
-            continue
-        result[name] = ErrorTests(
-            {stage: found[k] for stage, found in intervals.items()},
-            {
-                stage: input_correlation(error[:, k], command, period, SLOW_PERIOD)
-                for stage, error in whole.items()
-            },
-            {
-                stage: whiteness(error[:, k], period, SLOW_PERIOD)
-                for stage, error in judged.one_step.items()
-            },
-        )
-    return result
+def _slow_period(findings: Findings) -> float:
+    """Return the period of the machine's slow mode, s, as it rests where a recording begins.
+
+    Without effects: dry friction would hold the piston. Where it cannot rest there, what a block
+    of the bootstrap takes for the longest.
+    """
+    angle, _ = findings.evidence.experiments[0].start()
+    plant = Plant(replace(findings.evidence.stated, effects=Effects()))
+    try:
+        rest = plant.initial(angle)
+    except SimulationError:
+        return BLOCK / PERIODS
+    return float(1.0 / linearize(plant, rest).modes()[0][0])
 
 
 def _plain(value: Any) -> Any:

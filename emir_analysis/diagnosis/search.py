@@ -27,6 +27,7 @@ from emir_analysis.diagnosis.select import (
     STRONG,
     at_noise,
     balance_score,
+    beyond,
     excess,
     free_run_score,
     leaves_quiet,
@@ -115,11 +116,11 @@ class Search:
             equal = self.simplest(_as_good(better), better)
             self._rounds[equal[0].effects] = equal
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
-            if sticks(best.trial) and self._excess(best.trial) < HOPELESS**2 - 1.0:
+            if sticks(best.trial) and self._excess(best.trial) < beyond(HOPELESS):
                 equal, best = self._by_beginning(equal, best)
             enough = self._enough(best.trial)
             many = len(best.trial.effects) >= MOST_BESIDE_ENOUGH
-            if enough and (many or self._excess(best.trial) <= LEFT**2 - 1.0):
+            if enough and (many or self._excess(best.trial) <= beyond(LEFT)):
                 break
         return best, equal, enough
 
@@ -187,7 +188,7 @@ class Search:
             if effect in self._settled:
                 continue
             fewer = self.whole.fitted(chosen).without(effect)
-            if not fewer.effects and self._excess(self.refitted) > EXPLAINED**2:
+            if not fewer.effects and self._excess(self.refitted) > beyond(EXPLAINED):
                 continue
             self._progress(f"fitting without: {effect}")
             fitted = self.whole.better(refine_free_run(fewer, self._evidence))
@@ -208,7 +209,7 @@ class Search:
         """
         if sticks(best.trial) and not at_noise(best.trial, self._head):
             return best
-        near = self._excess(best.trial) < HOPELESS**2
+        near = self._excess(best.trial) < beyond(HOPELESS)
         return replace(best, trial=self.whole.fitted(best.trial)) if near else best
 
     def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
@@ -217,18 +218,22 @@ class Search:
         The same where that is no better on the whole, where they leave nothing, or where the
         beginning was asked before.
         """
-        if self._excess(best.trial) <= LEFT**2 - 1.0:
+        if self._excess(best.trial) <= beyond(LEFT):
             return equal, best
         start = fullest(best.trial, self._sheet)
         if start.effects in self._begun:
             return equal, best
+        led = self.whole.led(best.trial)
+        if led is not None:
+            self.whole.keep(led)
+            return equal, replace(best, trial=led)
         self._begun.add(start.effects)
         self._progress(f"friction by a growing beginning: {best.trial.name}")
         law = begun(start, self._evidence, self.floor)
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
         if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
             return equal, best
-        found = self.whole.with_friction(law, fuller)
+        found = self.whole.with_friction(law, fuller, best.trial)
         if self.whole.score(found) > self.whole.score(best.trial) - STRONG:
             return equal, best
         self.whole.keep(found)
@@ -271,7 +276,7 @@ class Search:
         if np.any(self._evidence.fitted):
             found = self._on_balances(best.trial).singles()
             better = self._by_balances(found, best)
-            near = any(self._excess(t.trial) < HOPELESS**2 for t in better)
+            near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
             told = near or self._evidence.complete
             if told and not self._quiet(best.trial):
                 return better
@@ -285,7 +290,7 @@ class Search:
 
         The part that the fits see is explained without, so that nothing there asks for it.
         """
-        unexplained = EXPLAINED**2 - 1.0
+        unexplained = beyond(EXPLAINED)
         if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
             return []
         near = self._evidence.until(_astray(best.trial, self._evidence) + SHORTEST)
@@ -409,7 +414,7 @@ class Search:
         parameters with it: they stay as the balances say, if those are all told.
         """
         full = fit_free_run(tried.trial, self._head)
-        if self._evidence.complete and excess(full, self._head) > HOPELESS**2 - 1.0:
+        if self._evidence.complete and excess(full, self._head) > beyond(HOPELESS):
             return replace(tried, free_run=free_run_score(full, self._evidence))
         ways = [full]
         for effect in full.effects:

@@ -119,6 +119,11 @@ def excess(tried: Trial, evidence: Evidence) -> float:
     return mean_square(tried, evidence) - 1.0
 
 
+def beyond(times: float) -> float:
+    """Return the excess of errors so many times as large as the noise."""
+    return times**2 - 1.0
+
+
 def at_noise(tried: Trial, evidence: Evidence) -> bool:
     """Tell whether all signals together are down to the noise."""
-    return excess(tried, evidence) <= AT_NOISE**2 - 1.0
+    return excess(tried, evidence) <= beyond(AT_NOISE)

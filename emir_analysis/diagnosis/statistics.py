@@ -1,5 +1,6 @@
 """How sure an error is, and what it still knows of its own past and of the input."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,12 +26,18 @@ class Interval:
     high: float
 
 
-def rms_intervals(error: Array, period: float, block: float = BLOCK) -> list[Interval]:
-    """Return the interval of each column's RMS, error (n, c), by bootstrap of blocks, s."""
-    size = max(1, round(block / period))
-    count = max(1, len(error) // size)
-    blocks = np.array([np.mean(part**2, axis=0) for part in np.array_split(error, count)])
-    drawn = np.random.default_rng(0).integers(0, count, (DRAWS, count))
+def rms_intervals(
+    errors: Sequence[Array], periods: Sequence[float], block: float = BLOCK
+) -> list[Interval]:
+    """Return the interval of each column's RMS by bootstrap of blocks, s.
+
+    errors: (n, c) of each recording, sampled every period, s.
+    """
+    parts: list[Array] = []
+    for error, period in zip(errors, periods, strict=True):
+        parts += np.array_split(error, max(1, len(error) // max(1, round(block / period))))
+    blocks = np.array([np.mean(part**2, axis=0) for part in parts])
+    drawn = np.random.default_rng(0).integers(0, len(parts), (DRAWS, len(parts)))
     found = np.sqrt(blocks[drawn].mean(axis=1))
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(found, [tail, 1.0 - tail], axis=0)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
+from emir_analysis.diagnosis.candidates import BEHIND, Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import (
@@ -130,11 +130,20 @@ def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
     return score(channels, evidence.duration(1.0) / BLOCK, fitted.x.size)
 
 
-def grown(known: Trial, evidence: Evidence) -> Trial:
-    """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole."""
+def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Trial:
+    """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole.
+
+    It is given up where it falls far behind a rival that was fitted to more than that beginning.
+    """
     end = max(float(e.time[-1]) for e in evidence.experiments)
     x = _at_rest(known, evidence)
-    return known.continued(_led(known, evidence, x, DECIDED, end, descended))
+    return known.continued(_led(known, evidence, x, DECIDED, end, descended, rival))
+
+
+def follows_the_beginning(known: Trial, evidence: Evidence) -> bool:
+    """Tell whether a trial's friction is near enough for the first DECIDED to be explained."""
+    _, misfit = _further(known, evidence.until(DECIDED))
+    return misfit <= LEFT
 
 
 def _further(known: Trial, evidence: Evidence) -> tuple[Trial, float]:
@@ -149,7 +158,13 @@ def _at_rest(known: Trial, evidence: Evidence) -> Array:
 
 
 def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
-    known: Trial, evidence: Evidence, x: Array, time: float, end: float, method: Method
+    known: Trial,
+    evidence: Evidence,
+    x: Array,
+    time: float,
+    end: float,
+    method: Method,
+    rival: Trial | None = None,
 ) -> Solution:
     """Fit to beginnings that grow from a time to another, s.
 
@@ -174,6 +189,8 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
             part = evidence.until(longer)
             fitted = _found_again(known, part, fitted, method, draws if holds else 1)
             holds = holds and fitted.misfit <= AS_BEFORE * before
+            if rival is not None and fitted.misfit > BEHIND * _misfit(rival, part):
+                break
         time = longer
     return fitted
 
@@ -235,6 +252,10 @@ def _drawn(
         others = fitted.x + WIDER * (others - fitted.x)
     points = np.vstack([fitted.x, others])
     return np.asarray(points[int(np.argmin(_errors(known, evidence, points)))])
+
+
+def _misfit(known: Trial, evidence: Evidence) -> float:
+    return float(_errors(known, evidence, _at_rest(known, evidence)[None])[0])
 
 
 def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:

@@ -26,7 +26,14 @@ from emir_analysis.diagnosis.candidates import (
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit, steps_inside
-from emir_analysis.diagnosis.select import EXPLAINED, STRONG, excess, free_run_score, score
+from emir_analysis.diagnosis.select import (
+    EXPLAINED,
+    STRONG,
+    beyond,
+    excess,
+    free_run_score,
+    score,
+)
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -76,7 +83,7 @@ class Curves:
         if best is None or best.share < TOLD:
             return None
         found = _fitted(best.trial, self._evidence)
-        return found if excess(found, self._evidence) <= EXPLAINED**2 - 1.0 else None
+        return found if excess(found, self._evidence) <= beyond(EXPLAINED) else None
 
     def uneven(self, named: Trial) -> bool:
         """Tell whether friction that differs with the direction says the balances clearly better.
@@ -117,7 +124,7 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
-    near = excess(start, evidence) <= EXPLAINED**2 - 1.0
+    near = excess(start, evidence) <= beyond(EXPLAINED)
     for share in (1.0,) if near else (*GROWING, 1.0):
         problem = free_run_problem(trial, evidence, x, share)
         solution = fit(_smoothly(problem, trial, begin), ACCURACY)

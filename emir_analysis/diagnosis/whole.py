@@ -27,8 +27,8 @@ from emir_analysis.diagnosis.friction_laws import (
     without_breakaway,
 )
 from emir_analysis.diagnosis.screening import LOAD
-from emir_analysis.diagnosis.select import STRONG, at_noise, excess, free_run_score
-from emir_analysis.diagnosis.stick_slip import grown
+from emir_analysis.diagnosis.select import STRONG, at_noise, beyond, excess, free_run_score
+from emir_analysis.diagnosis.stick_slip import follows_the_beginning, grown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
@@ -54,8 +54,8 @@ class Whole:
         """Return a trial fitted to the free run of the whole recordings."""
         if chosen.effects not in self._known:
             self._progress(f"fitting to the whole recording: {chosen.name}")
-            fitted = refine_free_run(chosen, self._evidence)
-            if LEFT**2 - 1.0 < self._excess(fitted) < HOPELESS**2:
+            fitted = self.led(chosen) or refine_free_run(chosen, self._evidence)
+            if beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
                 fitted = self._with_fewer_sizes(fitted)
                 if sticks(fitted):
                     fitted = self._led_again(fitted)
@@ -64,12 +64,24 @@ class Whole:
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
+    def led(self, chosen: Trial) -> Trial | None:
+        """Return a trial that sticks led along a beginning that grows, if it is all that is needed.
+
+        Over all of a recording at once a fit takes long, and ends close to where it began.
+        """
+        if not sticks(chosen) or self._excess(chosen) <= beyond(LEFT):
+            return None
+        if not follows_the_beginning(chosen, self._evidence):
+            return None
+        led = grown(chosen, self._evidence)
+        return led if self._excess(led) <= beyond(LEFT) else None
+
     def _refined_again(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from where it ended, as long as that helps much.
 
         Where something switches, slopes lead only a little way at a time.
         """
-        while self._excess(fitted) > LEFT**2 - 1.0:
+        while self._excess(fitted) > beyond(LEFT):
             again = refine_free_run(fitted, self._evidence)
             if self.score(again) > self.score(fitted) - STRONG:
                 break
@@ -120,7 +132,7 @@ class Whole:
         for k, unknown in enumerate(fitted.unknowns.members):
             for end in (unknown.low, unknown.high) if unknown.is_share else ():
                 begun = fitted.at(moved(fitted.x, [k], [end]))
-                if self._excess(fitted) > LEFT**2 - 1.0 and self.score(begun) != self.score(fitted):
+                if self._excess(fitted) > beyond(LEFT) and self.score(begun) != self.score(fitted):
                     begun = glimpsed(begun, self._evidence)
                     if self.score(begun) < self.score(fitted) - STRONG:
                         fitted = refine_free_run(begun, self._evidence)
@@ -192,22 +204,22 @@ class Whole:
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)
 
-    def with_friction(self, law: Trial, fuller: list[Trial]) -> Trial:
+    def with_friction(self, law: Trial, fuller: list[Trial], rival: Trial) -> Trial:
         """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
 
         A break-away may show in later sticks than those of the beginning, and whether friction
         comes by tanh or gradually shows in many sticks only.
         """
-        found = self._heard(grown(law, self._evidence))
-        off = LEFT**2 - 1.0 < self._excess(found) < HOPELESS**2
+        found = self._heard(grown(law, self._evidence, rival))
+        off = beyond(LEFT) < self._excess(found) < beyond(HOPELESS)
         if off and not is_gradual(law):
-            other = self._heard(grown(gradual(law), self._evidence))
+            other = self._heard(grown(gradual(law), self._evidence, rival))
             if self.score(other) < self.score(found):
                 found, fuller = other, [gradual(more) for more in fuller]
         for more in fuller:
             if at_noise(found, self._evidence):
                 break
-            led = self._heard(grown(more, self._evidence))
+            led = self._heard(grown(more, self._evidence, rival))
             if at_noise(led, self._evidence):
                 found = led
         return found

@@ -10,7 +10,7 @@ PERIOD, SLOW = 0.05, 1.4  # s
 
 def test_the_interval_of_white_noise_is_as_wide_as_theory_says() -> None:
     noise = np.random.default_rng(0).standard_normal((6000, 1))
-    (found,) = rms_intervals(noise, PERIOD)
+    (found,) = rms_intervals([noise], [PERIOD])
     half = 1.96 / np.sqrt(2.0 * len(noise))  # of the standard deviation, chi squared
     assert found.low == pytest.approx(1.0 - half, abs=half)
     assert found.high == pytest.approx(1.0 + half, abs=half)

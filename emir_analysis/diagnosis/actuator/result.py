@@ -11,11 +11,11 @@ from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
 from emir_analysis.diagnosis.actuator.search import Search
 from emir_analysis.diagnosis.actuator.verdict import BALANCE, statement, verdict
+from emir_analysis.diagnosis.error_tests import ErrorTests
 from emir_analysis.diagnosis.result import (
     OPEN,
     BalanceResult,
     EffectResult,
-    ErrorTests,
     ParameterResult,
     SignalResult,
     confounded,
@@ -226,7 +226,7 @@ def _tests(
 ) -> ErrorTests:
     period, opening = judged.period, judged.opening
     return ErrorTests(
-        {n: rms_intervals(e[:, None], period, BLOCK * slow)[0] for n, e in errors.items()},
+        {n: rms_intervals([e[:, None]], [period], BLOCK * slow)[0] for n, e in errors.items()},
         {n: input_correlation(e, opening, period, slow) for n, e in errors.items()},
         {n: whiteness(e, period, slow) for n, e in ahead.items()},
     )

@@ -19,7 +19,8 @@ from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
-from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
+from emir_analysis.diagnosis.late_end import with_a_late_end
+from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
@@ -410,8 +411,9 @@ class Search:
         """Return a trial fitted to the free run.
 
         Of several sizes of an effect one alone is taken where the others are not worth their while.
-        Where all that leads nowhere near, what else is missing drives the free run away and the
-        parameters with it: they stay as the balances say, if those are all told.
+        A load may have ended since. Where all that leads nowhere near, what else is missing drives
+        the free run away and the parameters with it: they stay as the balances say, if those are
+        all told.
         """
         full = fit_free_run(tried.trial, self._head)
         if self._evidence.complete and excess(full, self._head) > beyond(HOPELESS):
@@ -422,6 +424,8 @@ class Search:
                 ways += with_fewer_terms(full, effect, self._head)
             else:
                 ways += full.with_each_size(effect)
+        if LOAD in full.effects:
+            ways += [with_a_late_end(way, self._evidence, SEEN) for way in ways]
         scores = [free_run_score(way, self._evidence) for way in ways]
         best_way = int(np.argmin(scores))
         return Tried(ways[best_way], tried.balances, scores[best_way])

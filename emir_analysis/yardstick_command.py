@@ -47,6 +47,8 @@ def command(words: Sequence[str], progress: Progress) -> str:
     check_picture(options.picture)
     if options.draws < 1:
         raise ParameterError(f"draws = {options.draws}: at least 1")
+    if options.seed < 0:
+        raise ParameterError(f"seed = {options.seed}: 0 or more")
     among = dataclasses.replace(HARD if options.hard else EVERYDAY, supply=options.supply * 1e5)
     aim = AIM_HARD if options.hard else AIM_RATIO
     machine = joint1()

@@ -130,7 +130,7 @@ def _finite(found: Score) -> dict[str, float | None]:
 
 
 def picture(scores: Scores, done: Sequence[tuple[Draw, float]], aim: float) -> Figure:
-    """Return R of every draw: sorted, and over posture and payload of the last controller."""
+    """Return R of every draw: sorted, and the last controller's over the stiffness of the oil."""
     figure = new_figure(4.2)
     ordered, spread = figure.subplots(1, 2)
     for name, found in scores.items():

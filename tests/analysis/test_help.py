@@ -10,8 +10,8 @@ from emir_plant.sheet import joint1
 
 COMMANDS = (
     ["import"], ["info"], ["bag"], ["bag", "recover"], ["replay"], ["view"], ["analyze"],
-    ["compare"], ["limit"], ["yardstick"], ["disturb"], ["linearize"], ["figures"], ["diagnose"],
-    ["urdf"], ["blind"], ["bench"], ["bench", "diagnosis"],
+    ["compare"], ["limit"], ["yardstick"], ["disturb"], ["design"], ["linearize"], ["figures"],
+    ["diagnose"], ["urdf"], ["blind"], ["bench"], ["bench", "diagnosis"],
 )  # fmt: skip
 
 

@@ -42,6 +42,7 @@ setup(
         "plotly>=6.0",
         "pyyaml>=6.0.1",
         "scipy>=1.12",
+        "zstandard>=0.22",
     ],
     extras_require={
         # ROS 2 Jazzy without an installation of ROS; not wanted where a Jazzy is sourced.

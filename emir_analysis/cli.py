@@ -105,12 +105,19 @@ def _hand_over(module: str, words: list[str]) -> int:
 def _import(words: list[str]) -> int:
     from emir_analysis.import_command import import_csv
 
-    parser = argparse.ArgumentParser(prog="emir import")
+    parser = argparse.ArgumentParser(
+        prog="emir import",
+        description="A CSV file as a recording that every other command takes (rosbag2, MCAP), by a"
+        " signal map. A blank cell is no sample.",
+    )
     parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
     parser.add_argument(
-        "--signals", type=Path, required=True, help="YAML: signal, column, topic, field, unit"
+        "--signals", type=Path, required=True, metavar="FILE",
+        help="signal map, YAML: of each signal column, topic, field, unit; the column of time",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="BAG", help="folder to write; must not exist"
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="BAG", help="must not exist")
     parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
     o = parser.parse_args(words)
     try:
@@ -129,12 +136,19 @@ def _import(words: list[str]) -> int:
 def _info(words: list[str]) -> int:
     from emir_analysis.info import fields_text, info, parameters_text, text
 
-    parser = argparse.ArgumentParser(prog="emir info")
-    parser.add_argument("bag", type=Path, help="any recording in MCAP")
-    parser.add_argument("--fields", action="store_true", help="unit and meaning of every field")
-    parser.add_argument(
-        "--parameters", action="store_true", help="the nodes' parameters, as a ROS parameter file"
+    parser = argparse.ArgumentParser(
+        prog="emir info",
+        description="What is in a recording: how it was made, whether it was finished, its topics"
+        " with type, number and rate of messages.",
     )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="any recording in MCAP")
+    parser.add_argument(
+        "--fields", action="store_true", help="instead: unit and meaning of every field"
+    )
+    parser.add_argument(
+        "--parameters", action="store_true",
+        help="instead: the nodes' parameters, as a ROS parameter file",
+    )  # fmt: skip
     options = parser.parse_args(words)
     found = info(options.bag)
     if options.fields:
@@ -149,12 +163,14 @@ def _info(words: list[str]) -> int:
 def _bag(words: list[str]) -> int:
     from emir_analysis.recover import recover
 
-    parser = argparse.ArgumentParser(prog="emir bag")
+    parser = argparse.ArgumentParser(prog="emir bag", description="Recover a recording.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    about = "a complete recording from one that was cut off"
+    about = "A complete recording of what can be read of one that was cut off or damaged"
     recovery = commands.add_parser("recover", help=about, description=about)
-    recovery.add_argument("bag", type=Path, help="folder or .mcap file")
-    recovery.add_argument("--out", type=Path, required=True, metavar="DIR", help="must not exist")
+    recovery.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    recovery.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder to write; must not exist"
+    )
     options = parser.parse_args(words)
     saved = recover(options.bag, options.out)
     for line in saved.damage:
@@ -171,12 +187,19 @@ def _replay(words: list[str]) -> int:
     from emir_analysis.stamped import same
     from emir_common.yaml_file import read_value
 
-    parser = argparse.ArgumentParser(prog="emir replay")
-    parser.add_argument("bag", type=Path, help="a recording of the graph, made in lock step")
-    parser.add_argument("--node", required=True, metavar="NAME", help=", ".join(NODES))
+    parser = argparse.ArgumentParser(
+        prog="emir replay",
+        description="Give the recorded inputs to what one node computes, and compare its answers"
+        " with the recorded ones, bit by bit. Exit code 1 where they differ.",
+    )
+    parser.add_argument(
+        "bag", type=Path, metavar="BAG", help="a recording of the graph, made in lock step"
+    )
+    parser.add_argument("--node", required=True, metavar="NAME", help=f"one of {', '.join(NODES)}")
     parser.add_argument(
         "--set", action="append", default=[], metavar="PARAM=VALUE",
-        help="show what this would have changed, open loop; may be repeated",
+        help="with this parameter of the node: how far the answers are then from the recorded ones,"
+        " the inputs being the same (open loop); may be repeated",
     )  # fmt: skip
     options = parser.parse_args(words)
     changed = {}
@@ -205,12 +228,23 @@ def _analyze(words: list[str]) -> int:
     from emir_analysis import run_report
     from emir_analysis.outputs import check_outputs, write_all
 
-    parser = argparse.ArgumentParser(prog="emir analyze")
-    parser.add_argument("bag", type=Path, nargs="+", help="recordings of the graph")
+    parser = argparse.ArgumentParser(
+        prog="emir analyze",
+        description="Figures of recordings of the graph: tracking error, lag, deflection,"
+        " pressures. Several recordings stand side by side.",
+    )
+    parser.add_argument(
+        "bag", type=Path, nargs="+", metavar="BAG", help="recordings of the graph, of one model"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="the same, one line a recording")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with plots")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="the way of the robot's TCP")
+    parser.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write the figures, one line for each recording"
+    )
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE",
+        help="of the whole robot: draw the way of its TCP",
+    )  # fmt: skip
     options = parser.parse_args(words)
     writes = [
         (options.json, run_report.write_json),
@@ -232,29 +266,58 @@ def _compare(words: list[str]) -> int:
     from emir_analysis.compare_command import command
 
     about = (
-        "Every controller over a grid of posture, payload, size of the move and model error;"
-        " what is named is varied, the rest then stays as usual; of one case, its curves."
+        "Every controller on the same moves of the nonlinear machine. Without --angle, --payload,"
+        " --size and --error: a grid of 36 cases (45 and 60 deg; 0, 750 and 1500 kg; 20 and"
+        " 63.75 mm; three model errors). With any of these: a grid of what they name, the others"
+        " at 45 deg, 0 kg, 63.75 mm, none. One case alone gives curves in place of a grid."
     )
     parser = argparse.ArgumentParser(prog="emir compare", description=about)
-    parser.add_argument("--angle", type=float, nargs="+", metavar="DEG", help="of the boom")
-    parser.add_argument("--payload", type=float, nargs="+", metavar="KG", help="not told to them")
-    parser.add_argument("--size", type=float, nargs="+", metavar="MM", help="of the move")
     parser.add_argument(
-        "--error", nargs="+", metavar="NAME", help="model errors: none, 'oil -20%%', ..."
-    )
-    parser.add_argument("--trajectory", default="lift-lower", help="lift-lower or lower-lift")
-    parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
-    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="mean and deviation")
-    parser.add_argument("--pfc", type=Path, metavar="FILE", help="made by emir design")
-    parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="made by emir design")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="of what the table shows")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="every move of the grid")
-    parser.add_argument(
-        "--trade-off", action="store_true", help="instead: cascade over k_p and T, others"
+        "--angle", type=float, nargs="+", metavar="DEG", help="of the boom at the start"
     )
     parser.add_argument(
-        "--damping", action="store_true", help="instead: force feedback and capillary line"
+        "--payload", type=float, nargs="+", metavar="KG",
+        help="at the TCP; the controllers are not told how much it is",
+    )  # fmt: skip
+    parser.add_argument(
+        "--size", type=float, nargs="+", metavar="MM", help="of the move, stroke of the piston"
     )
+    parser.add_argument(
+        "--error", nargs="+", metavar="NAME",
+        help="how the machine differs from what the controllers know: none, 'oil -20%%',"
+        " 'oil +20%%', 'return -30%%', 'return +30%%', 'friction 5 kN', 'hysteresis 1%%'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--trajectory", default="lift-lower", metavar="NAME",
+        help="of one case: lift-lower (default) or lower-lift",
+    )  # fmt: skip
+    parser.add_argument(
+        "--controllers", nargs="+", metavar="NAME",
+        help="some of cascade, zv, zvd, lqg, mpc; 'pfc, WHAT' and 'pfc_tip, WHAT' with preview,"
+        " velocity, constant or scheduled for WHAT; default: all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--repeat", type=int, default=1, metavar="N",
+        help="of one case: mean and deviation of N runs with other sensor noise; default 1",
+    )  # fmt: skip
+    parser.add_argument(
+        "--pfc", type=Path, metavar="FILE",
+        help="design of pfc, made by emir design; default: that of the project",
+    )  # fmt: skip
+    parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="the same of pfc_tip")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw what the table shows")
+    parser.add_argument(
+        "--csv", type=Path, metavar="FILE", help="of a grid: write the figures of every move"
+    )
+    parser.add_argument(
+        "--trade-off", action="store_true",
+        help="instead: bending over tracking error of the cascade, for 24 pairs of k_p and T,"
+        " beside the other controllers",
+    )  # fmt: skip
+    parser.add_argument(
+        "--damping", action="store_true",
+        help="instead: the machine damped by force feedback, and by a capillary line",
+    )  # fmt: skip
     options = parser.parse_args(words)
     return _said(str, lambda: command(options, _progress))
 
@@ -298,11 +361,21 @@ def _bench(words: list[str]) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one core is measured
     from emir_analysis.bench.command import PARTS, command
 
-    parser = argparse.ArgumentParser(prog="emir bench")
-    parser.add_argument("what", choices=(*PARTS, "graph", "diagnosis"))
-    parser.add_argument(
-        "--seconds", type=float, default=3.0, metavar="S", help="for each way that is compared"
+    parser = argparse.ArgumentParser(
+        prog="emir bench",
+        description="How fast all this is, beside other programs that do the same in the same run."
+        " What is not installed is named.",
     )
+    parser.add_argument(
+        "what", choices=(*PARTS, "graph", "diagnosis"),
+        help="plant: the machine's models; control: the controllers; graph: lock step, latency,"
+        " jitter, recorder (needs ROS 2); diagnosis: general identification tools on the recordings"
+        " of emir diagnose. The last two have options of their own: emir bench graph --help",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S",
+        help="of plant and control: time for each program that is compared; default 3",
+    )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     command(parser.parse_args(words), print)
     return 0
@@ -319,11 +392,17 @@ def _figures(words: list[str]) -> int:
     from emir_analysis.paper_figures import FIGURES, draw
 
     everything = ",".join(map(str, FIGURES))
-    parser = argparse.ArgumentParser(prog="emir figures")
-    parser.add_argument("--only", default=everything, metavar="N,N", help=f"of {everything}")
+    parser = argparse.ArgumentParser(
+        prog="emir figures",
+        description="The paper's figures as this machine draws them, and a table (table.md,"
+        " table.json) of the paper's numbers beside ours, measured anew.",
+    )
+    parser.add_argument(
+        "--only", default=everything, metavar="N,N", help=f"these figures; default {everything}"
+    )
     folder = parser.add_mutually_exclusive_group(required=True)
-    folder.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="for all files")
-    folder.add_argument("--out", type=Path, metavar="DIR", help="the same")
+    folder.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="where to write")
+    folder.add_argument("--out", type=Path, metavar="DIR", help="the same, as an option")
     options = parser.parse_args(words)
     numbers = options.only.split(",")
     if not all(number.isdecimal() for number in numbers):
@@ -345,7 +424,9 @@ def _diagnose(words: list[str]) -> int:
         " effects), ambiguous (which ones, and what would tell them apart) or unexplained (which"
         " balance, how large, against what).",
     )
-    parser.add_argument("bag", type=Path, nargs="+", help="recordings to find out from")
+    parser.add_argument(
+        "bag", type=Path, nargs="+", metavar="BAG", help="recordings of one machine to learn from"
+    )
     parser.add_argument(
         "--datasheet", type=Path, metavar="FILE",
         help="YAML of the machine, values and tolerances (default: EMIR's main joint)",
@@ -356,7 +437,7 @@ def _diagnose(words: list[str]) -> int:
     )  # fmt: skip
     parser.add_argument(
         "--judge", type=Path, nargs="+", action="extend", metavar="BAG",
-        help="recordings to be judged on",
+        help="recordings to judge by, opened when all is fitted; default: those learned from",
     )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write a report with pictures")

@@ -50,7 +50,8 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], str]:
     """Return each row that is not blank with the number of its line, and what may be its point."""
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
-            first = next((line for line in stream if not line.startswith(COMMENT)), "")
+            lines = (line for line in stream if line.strip() and not line.startswith(COMMENT))
+            first = next(lines, "")
             stream.seek(0)
             separator = max(SEPARATORS, key=first.count)
             reader = csv.reader(stream, delimiter=separator)

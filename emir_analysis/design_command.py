@@ -33,6 +33,10 @@ from emir_plant.parameters import Machine, cautions
 from emir_plant.plant import SimulationError
 from emir_plant.sheet import joint1, load_sheet
 
+ABOUT = (
+    "A controller for a machine, or from a recording, as a file that its node loads; and where over"
+    " posture and payload the closed loop is stable."
+)
 RECORDED_ORDER = 4  # an ordinary run tells no more than the integrator and the slow mode
 OF_PFC = {
     "order": None, "angle": 45.0, "payload": 0.0, "observer": 0.0, "schedule": False,
@@ -101,7 +105,7 @@ def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool)
 
 
 def _parser() -> ArgumentParser:
-    parser = ArgumentParser(prog="emir design")
+    parser = ArgumentParser(prog="emir design", description=ABOUT)
     parser.add_argument(
         "--from", dest="machine", metavar="MODEL|BAG", type=Path,
         help="YAML of the machine or recording of a run; default: EMIR's joint 1",
@@ -110,8 +114,12 @@ def _parser() -> ArgumentParser:
     parser.add_argument(
         "--order", type=int, help="of the internal model; default 6, tip 8, from a recording 4"
     )
-    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
-    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
+    parser.add_argument(
+        "--angle", type=float, default=45.0, metavar="DEG", help="of the boom; default 45"
+    )
+    parser.add_argument(
+        "--payload", type=float, default=0.0, metavar="KG", help="at the TCP; default 0"
+    )
     parser.add_argument(
         "--observer", type=float, default=0.0, metavar="M/S",
         help="Kalman filter in place of an independent model: unknown input's change per sample",
@@ -124,7 +132,8 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--response-time", type=float, metavar="S", help="T_CLRT")
     parser.add_argument(
         "--oil-tolerance", type=float, default=OF_LQG["oil_tolerance"], metavar="X",
-        help="of lqg and mpc: by how much the oil's stiffness may differ from the stated one",
+        help="of lqg and mpc: by how much the oil's stiffness may differ from what is stated;"
+        " default 0.2",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")

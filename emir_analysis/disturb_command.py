@@ -61,10 +61,22 @@ CASES = tuple(
 
 def command(words: Sequence[str], progress: Progress) -> str:
     """Run, draw, return the table. Raises InputError or ParameterError."""
-    parser = ArgumentParser(prog="emir disturb")
-    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
-    parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="dynamic deflections")
+    parser = ArgumentParser(
+        prog="emir disturb",
+        description="What each controller makes of a push at the TCP and of a load that is dropped"
+        " or picked up, at rest and in the middle of a move.",
+    )
+    parser.add_argument(
+        "--angle", type=float, default=45.0, metavar="DEG",
+        help="of the boom at the start; default 45",
+    )  # fmt: skip
+    parser.add_argument(
+        "--controllers", nargs="+", metavar="NAME",
+        help="some of cascade, zv, zvd, pfc, pfc_tip, mpc, lqg; default: all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE", help="draw the dynamic deflections over time"
+    )
     options = parser.parse_args(words)
     check_outputs([options.picture], None, [])
     check_picture(options.picture)

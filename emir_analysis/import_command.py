@@ -31,6 +31,7 @@ from emir_msgs_py.topics import FLUID_PRESSURE, JOINT_STATE
 
 METADATA = "emir.import"  # the record that says where a recording came from
 LAST_STAMP = 2**31  # s, of a ROS stamp
+SHORTEST = 1e-9  # s, that two stamps can be apart
 LAST_INDEX = 99  # of a field: a JointState with a hundred joints
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "sample": 1.0}
 UNITS = {  # a column's unit -> SI unit, factor
@@ -195,15 +196,18 @@ def _columns(file: Path) -> dict[str, Column]:
 
 
 def _time(table: Path, clock: _Clock, read: dict[str, Array], count: int) -> Array:
-    if clock.column is None:
-        return clock.period * np.arange(count, dtype=np.float64)
-    time = clock.period * read[clock.column]
-    behind = np.flatnonzero(np.diff(time) <= 0.0)
+    name, time = "period", clock.period * np.arange(count, dtype=np.float64)
+    if clock.column is not None:
+        name, time = clock.column, clock.period * read[clock.column]
+    apart = np.diff(time)
+    behind = np.flatnonzero(apart <= 0.0)
     if behind.size:
-        raise InputError(f"{table}: {clock.column} does not increase at row {behind[0] + 1}")
+        raise InputError(f"{table}: {name} does not increase at row {behind[0] + 1}")
+    if np.any(apart < SHORTEST):
+        raise InputError(f"{table}: {name}: rows are less than {SHORTEST:g} s apart")
     if time[0] < 0.0 or time[-1] >= LAST_STAMP:
         raise InputError(
-            f"{table}: {clock.column}: a stamp holds 0 ... {LAST_STAMP} s; let the times begin at 0"
+            f"{table}: {name}: a stamp holds 0 ... {LAST_STAMP} s; let the times begin at 0"
         )
     return np.asarray(time)
 

@@ -36,17 +36,29 @@ def command(words: Sequence[str]) -> str:
 
 
 def _parser() -> ArgumentParser:
-    parser = ArgumentParser(prog="emir limit")
-    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="at the start")
-    parser.add_argument("--payload", type=float, default=0.0, metavar="KG", help="at the TCP")
+    parser = ArgumentParser(
+        prog="emir limit",
+        description="The smallest dynamic deflection of the TCP that any command could reach for a"
+        " move: a linear program over the joint's acceleration (docs/limit.md).",
+    )
+    parser.add_argument(
+        "--angle", type=float, default=45.0, metavar="DEG",
+        help="of the boom at the start; default 45",
+    )  # fmt: skip
+    parser.add_argument(
+        "--payload", type=float, default=0.0, metavar="KG", help="at the TCP; default 0"
+    )
     parser.add_argument(
         "--stroke", type=float, default=PAPER_MOVE.distance * 1e3, metavar="MM",
         help="of the piston, lifting positive; default 63.75",
     )  # fmt: skip
     parser.add_argument(
-        "--duration", type=float, default=PAPER_MOVE.duration, metavar="S", help="default 3.3"
+        "--duration", type=float, default=PAPER_MOVE.duration, metavar="S",
+        help="of the move; default 3.3",
+    )  # fmt: skip
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE", help="draw the motion that reaches it"
     )
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="the motion that does it")
     return parser
 
 

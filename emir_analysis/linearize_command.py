@@ -74,25 +74,40 @@ def _models(machine: Machine, point: Point, options: argparse.Namespace) -> Desi
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="emir linearize", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="emir linearize",
+        description="Linear models of the machine in a steady motion, as it is and reduced, with"
+        f" their errors over frequency and against a nonlinear step: {PICTURE} and {NUMBERS}."
+        " Needs the extra `design`.",
+    )
     parser.add_argument(
         "--from", dest="machine", metavar="MODEL", default="joint1",
         help="YAML of the machine; default: EMIR's joint 1",
     )  # fmt: skip
-    parser.add_argument("--angle", type=float, default=45.0, metavar="DEG", help="boom angle")
-    parser.add_argument("--payload", type=float, metavar="KG", help="default: the machine's")
+    parser.add_argument(
+        "--angle", type=float, default=45.0, metavar="DEG", help="of the boom; default 45"
+    )
+    parser.add_argument(
+        "--payload", type=float, metavar="KG", help="at the TCP; default: the machine's"
+    )
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument(
         "--velocity", type=float, default=10.0, metavar="MM/S", help="of the piston; default 10"
     )
-    motion.add_argument("--command", type=float, metavar="Y2", help="instead: the valve's current")
+    motion.add_argument("--command", type=float, metavar="Y2", help="instead: the valve's, -1 to 1")
     parser.add_argument(
         "--outputs", nargs="+", metavar="NAME", default=["stroke", "tip_angle"],
         help="default stroke tip_angle; also velocity, force, pressure_lifting, ...",
     )  # fmt: skip
-    parser.add_argument("--order", type=int, nargs="+", metavar="N", default=list(ORDERS))
-    parser.add_argument("--step", type=float, default=0.02, metavar="Y2", help="of the response")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for the files")
+    parser.add_argument(
+        "--order", type=int, nargs="+", metavar="N", default=list(ORDERS),
+        help=f"of the reduced models; default {' '.join(map(str, ORDERS))}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--step", type=float, default=0.02, metavar="Y2",
+        help="of the valve, for the step response that is compared; default 0.02",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where to write")
     return parser
 
 

@@ -90,7 +90,8 @@ def tcp_deflection_static(run: Recording) -> float | None:
     if "tcp_deflection" not in run.signals:
         return None
     signal = run["tcp_deflection"]
-    return float(np.mean(signal.value[signal.time <= _first_move(run)]))
+    at_rest = signal.value[signal.time <= _first_move(run)]
+    return float(np.mean(at_rest)) if at_rest.size else None
 
 
 def tcp_deflection_up(run: Recording) -> float | None:

@@ -52,11 +52,10 @@ def _robot_metrics(run: Recording) -> list[Metric]:
          "Orientation of the TCP against its reference, likewise."),
         ("tcp_tilt_peak", float(turned_off.max()), "rad", "The same, largest."),
     ]  # fmt: skip
-    found = [Metric(*figure) for figure in figures]
-    if "supply_pressure" in run.signals:
-        lowest = float(run["supply_pressure"].value.min())
-        found.append(Metric("supply_pressure_lowest", lowest, "Pa", "Pressure at the pump."))
-    return found
+    supply = run["supply_pressure"].value if "supply_pressure" in run.signals else None
+    lowest = None if supply is None else float(supply.min())
+    pump = Metric("supply_pressure_lowest", lowest, "Pa", "Pressure at the pump.")
+    return [*(Metric(*figure) for figure in figures), pump]
 
 
 def rms(values: Array) -> float:

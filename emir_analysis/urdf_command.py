@@ -10,11 +10,13 @@ from emir_plant.robot.sheet import robot
 
 def parser() -> argparse.ArgumentParser:
     """Return the command's options."""
-    about = "Write the whole robot as URDF: every joint, linkage part and cut; needs Pinocchio."
+    about = "The whole robot as URDF: every joint, linkage part and cut. Needs the extra `robot`."
     options = argparse.ArgumentParser(prog="emir urdf", description=about)
-    options.add_argument("file", type=Path, metavar="FILE")
+    options.add_argument("file", type=Path, metavar="FILE", help="URDF to write")
     options.add_argument("--robot", type=Path, metavar="YAML", help="default: EMIR's robot.yaml")
-    options.add_argument("--machine", type=Path, metavar="YAML", help="its main joint's")
+    options.add_argument(
+        "--machine", type=Path, metavar="YAML", help="its main joint; default: EMIR's joint1.yaml"
+    )
     return options
 
 

@@ -47,6 +47,8 @@ def command(words: Sequence[str], progress: Progress) -> str:
     check_picture(options.picture)
     if options.draws < 1:
         raise ParameterError(f"draws = {options.draws}: at least 1")
+    if options.seed < 0:
+        raise ParameterError(f"seed = {options.seed}: 0 or more")
     among = dataclasses.replace(HARD if options.hard else EVERYDAY, supply=options.supply * 1e5)
     aim = AIM_HARD if options.hard else AIM_RATIO
     machine = joint1()
@@ -68,19 +70,33 @@ def command(words: Sequence[str], progress: Progress) -> str:
 
 
 def _parser() -> ArgumentParser:
-    parser = ArgumentParser(prog="emir yardstick")
-    parser.add_argument("--draws", type=int, default=20, metavar="N")
-    parser.add_argument("--seed", type=int, default=0, metavar="K", help="the same draws again")
-    parser.add_argument("--controllers", nargs="+", metavar="NAME", help="default: all")
+    parser = ArgumentParser(
+        prog="emir yardstick",
+        description="Controllers against the limit, over random draws of the machine: R is the"
+        " largest dynamic deflection in a run over the smallest that any command could reach for"
+        " the same move (docs/limit.md).",
+    )
     parser.add_argument(
-        "--supply", type=float, default=EVERYDAY.supply / 1e5, metavar="BAR",
-        help="pump pressure; 200 bar do not lift 1500 kg at 30 deg",
+        "--draws", type=int, default=20, metavar="N", help="how many machines; default 20"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="K",
+        help="which machines: the same number, the same machines; default 0",
     )  # fmt: skip
     parser.add_argument(
-        "--hard", action="store_true", help="empty, 60-75 deg, lowering, logic block at 80 bar"
-    )
+        "--controllers", nargs="+", metavar="NAME",
+        help="some of cascade, zv, zvd, pfc, pfc_tip, mpc, lqg; default: all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--supply", type=float, default=EVERYDAY.supply / 1e5, metavar="BAR",
+        help=f"pump pressure, default {EVERYDAY.supply / 1e5:g}; 200 do not lift 1500 kg at 30 deg",
+    )  # fmt: skip
+    parser.add_argument(
+        "--hard", action="store_true",
+        help="draw hard cases alone: empty, 60-75 deg, lowering, logic block at 80 bar",
+    )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every draw's figures")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="R of every draw")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw R of every machine")
     return parser
 
 
@@ -130,7 +146,7 @@ def _finite(found: Score) -> dict[str, float | None]:
 
 
 def picture(scores: Scores, done: Sequence[tuple[Draw, float]], aim: float) -> Figure:
-    """Return R of every draw: sorted, and over posture and payload of the last controller."""
+    """Return R of every draw: sorted, and the last controller's over the stiffness of the oil."""
     figure = new_figure(4.2)
     ordered, spread = figure.subplots(1, 2)
     for name, found in scores.items():

@@ -24,7 +24,8 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
 
     One number of a list is given by its place behind the list's path: `unnamed_force.friction.3`.
 
-    Raises ParameterError for a path that does not exist or a value out of range.
+    Raises ParameterError for a path that does not exist or a value out of range or
+    with a fraction where a whole number is wanted.
     """
     result: Tree = _replaced(tree, values, "")
     return result
@@ -39,7 +40,10 @@ def _replaced(tree: Any, values: Mapping[str, Any], prefix: str) -> Any:
             branches.setdefault(name, {})[rest] = value
         elif name in quantities(tree):
             quantities(tree)[name].check(prefix + name, value)
-            new[name] = type(getattr(tree, name))(value)
+            kind = type(getattr(tree, name))
+            if kind is int and value != int(value):
+                raise ParameterError(f"{prefix}{name} = {value}: not a whole number")
+            new[name] = kind(value)
         else:
             raise _unknown(tree, prefix, name)
     known = {field.name for field in dataclasses.fields(tree)}

@@ -25,12 +25,13 @@ class _Loader(yaml.SafeLoader):
         """Return the map. Raises ConstructorError for a key that stands twice."""
         names: set[str] = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue  # the library tells which of these can be a key
             if key.value in names:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"{key.value} stands twice", key.start_mark
                 )
-            if isinstance(key, yaml.ScalarNode):
-                names.add(key.value)
+            names.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
 
@@ -43,7 +44,12 @@ _Loader.add_implicit_resolver(
 
 def read_value(text: str) -> Any:
     """Return what a text is as YAML. Raises yaml.YAMLError for what is none."""
-    return yaml.load(text, _Loader)  # noqa: S506 (a SafeLoader)
+    try:
+        return yaml.load(text, _Loader)  # noqa: S506 (a SafeLoader)
+    except ValueError as error:  # as of a date that no calendar has
+        raise yaml.YAMLError(str(error)) from None
+    except RecursionError:
+        raise yaml.YAMLError("nested too deep") from None
 
 
 def read_map(file: Path, *, what: str) -> dict[Any, Any]:

@@ -59,8 +59,12 @@ def _in_order(topic: Topic, message: Any) -> Any:
             raise LookupError(f"the message has no {name}, but {', '.join(given)}")
     order = [given.index(name) for name in topic.names]
     arrays = {name: getattr(message, name) for name in ("position", "velocity", "effort")}
+    # an array that lacks one of them would put the others in the wrong places: as if not given
     return SimpleNamespace(
-        **{name: [of[k] for k in order if k < len(of)] for name, of in arrays.items()}
+        **{
+            name: [of[k] for k in order] if len(of) > max(order) else []
+            for name, of in arrays.items()
+        }
     )
 
 

@@ -71,7 +71,10 @@ MEANINGS |= {
 }
 MEANINGS |= {f"{name}_command": f"piston velocity that {name} asks for" for name in OUTER_LOOPS}
 MEANINGS |= {f"{name}_active": f"1 while {name} drives the machine" for name in OUTER_LOOPS}
-MEANINGS |= {f"{name}_ready": f"1 where {name} may take over: at rest" for name in VALVE_LOOPS}
+MEANINGS |= {
+    f"{name}_ready": f"1 where {name} may take over: at rest, or early in a move"
+    for name in VALVE_LOOPS
+}
 MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
 
 

@@ -68,7 +68,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="emir bench graph", description=__doc__)
+    parser = argparse.ArgumentParser(prog="emir bench graph", description=(
+        "How fast the graph steps in lock step, how late messages and control periods are in real"
+        " time, what the recorder takes, how fast recordings are read."
+    ))  # fmt: skip
     for name, default, what in (
         ("simulated", 60.0, "simulated time of a run in lock step"),
         ("latency", 10.0, "time for each rate"),

@@ -68,7 +68,10 @@ class ReplayNode(Shell):
             raise ParameterError("replay_node: bag: the recording to replay is missing")
         self._by_topic: dict[str, Any] = {}
         self._messages = self._open(Path(bag), {name for name in chosen if name})
-        self._next = next(self._messages, None)
+        try:
+            self._next = next(self._messages, None)
+        except InputError as error:
+            raise ParameterError(f"replay_node: {error}") from None
         if self._next is None:
             raise ParameterError(f"replay_node: {bag}: no message of these topics")
         self._position = float(self._next.time)  # ns, in the recording's time

@@ -24,6 +24,7 @@ from emir_plant.plant import SimulationError
 from emir_ros.graph import (
     CONTROLLERS,
     MODELS,
+    ROBOT_CONTROLLERS,
     Plan,
     check,
     read_parameters,
@@ -90,24 +91,51 @@ def _duration(plan: Plan) -> float | None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="emir run", description=__doc__)
-    parser.add_argument("--model", default="joint1", help=", ".join(MODELS))
-    parser.add_argument("--controller", default="cascade", help=", ".join(CONTROLLERS))
+    parser = argparse.ArgumentParser(
+        prog="emir run",
+        description="Start the graph of machine and controllers, record it, stop it when the"
+        " machine's run is over, show the figures of the run.",
+    )
+    parser.add_argument(
+        "--model", default="joint1", metavar="NAME", help=f"{', '.join(MODELS)}; default joint1"
+    )
+    parser.add_argument(
+        "--controller", default="cascade", metavar="NAME",
+        help=f"{', '.join(CONTROLLERS)} (robot: {', '.join(ROBOT_CONTROLLERS)});"
+        " default cascade",
+    )  # fmt: skip
     parser.add_argument(
         "--switch", action="append", default=[], metavar="S=NAME",
-        help="to which controller at what time, while it moves; may be repeated",
+        help="at S seconds to the controller NAME, while the machine moves; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--trajectory", help=f"{TRAJECTORIES}; default: the file's, or lift-lower")
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="default: the file's, or that of --trajectory"
+        "--trajectory", metavar="NAME",
+        help=f"{TRAJECTORIES}; default: that of --params, or lift-lower",
+    )  # fmt: skip
+    parser.add_argument(
+        "--duration", type=float, metavar="S",
+        help="simulated time; default: that of --params, or as long as the trajectory takes",
+    )  # fmt: skip
+    parser.add_argument(
+        "--params", type=Path, metavar="FILE", help="ROS 2 parameter file of the nodes"
     )
-    parser.add_argument("--params", type=Path, metavar="FILE", help="ROS 2 parameter file")
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument("--realtime", action="store_true", help="as fast as the clock on the wall")
-    pace.add_argument("--lockstep", action="store_true", help="as fast as it goes (default)")
-    parser.add_argument("--processes", choices=("one", "many"), default="one")
-    parser.add_argument("--namespace", default="", metavar="NAME", help="of all nodes and topics")
-    parser.add_argument("--bag", type=Path, required=True, metavar="DIR", help="the recording")
+    pace.add_argument(
+        "--lockstep", action="store_true",
+        help="as fast as it goes, the same recording every time (default)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--processes", choices=("one", "many"), default="one",
+        help="all nodes in one process (default), or each in its own",
+    )  # fmt: skip
+    parser.add_argument(
+        "--namespace", default="", metavar="NAME", help="of all nodes and topics; default: none"
+    )
+    parser.add_argument(
+        "--bag", type=Path, required=True, metavar="DIR",
+        help="folder of the recording; must not exist",
+    )  # fmt: skip
     return parser
 
 

@@ -36,9 +36,10 @@ JOINT_TRAJECTORY = "joint_trajectory"
 
 
 class TrajectoryNode(ControlNode):
-    """cylinder_states -> cylinder_reference, cylinder_preview.
+    """cylinder_states -> cylinder_reference, cylinder_preview, cylinder_move.
 
-    Of the whole robot: joint_states -> cylinder_reference, tcp_reference. joint_trajectory takes
+    Of the whole robot: joint_states, cylinder_states -> cylinder_reference, cylinder_preview,
+    tcp_reference. joint_trajectory takes
     the named trajectory's place.
     """
 

@@ -56,10 +56,24 @@ class Row:
 
 def command(words: Sequence[str], write: Callable[[str], None]) -> None:
     """Write the table as Markdown. Raises InputError for what is missing."""
-    parser = argparse.ArgumentParser(prog="emir bench diagnosis")
-    parser.add_argument("recordings", type=Path, help="with NAME_a, NAME_b and signals.yaml")
-    parser.add_argument("--machines", nargs="+", required=True, metavar="NAME")
-    parser.add_argument("--diagnoses", type=Path, required=True, help="NAME.json of emir diagnose")
+    parser = argparse.ArgumentParser(
+        prog="emir bench diagnosis",
+        description="PySINDy and SysIdentPy on the recordings of emir diagnose, beside its results."
+        " Needs the extra `identification`, in an environment of its own"
+        " (docs/identification.md).",
+    )
+    parser.add_argument(
+        "recordings", type=Path, metavar="RECORDINGS",
+        help="folder with, of each machine, NAME_a to learn from and NAME_b to be judged on, and"
+        " with signals.yaml",
+    )  # fmt: skip
+    parser.add_argument(
+        "--machines", nargs="+", required=True, metavar="NAME", help="of the recordings"
+    )
+    parser.add_argument(
+        "--diagnoses", type=Path, required=True, metavar="DIR",
+        help="folder with what emir diagnose --json wrote of each machine, as NAME.json",
+    )  # fmt: skip
     options = parser.parse_args(words)
     signals = read_signal_map(options.recordings / "signals.yaml")
     boom = COMMAND in signals

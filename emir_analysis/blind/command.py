@@ -16,16 +16,32 @@ from emir_analysis.outputs import check_outputs, written
 def arguments(words: list[str]) -> argparse.Namespace:
     """Read the command's words."""
     parser = argparse.ArgumentParser(
-        prog="emir blind", description="diagnose machines with something hidden in them"
+        prog="emir blind",
+        description="Machines with something hidden in them, simulated by a second model: does"
+        " `emir diagnose` find it? Prints rates, a table of what was taken for what, and errors."
+        " An interrupted test goes on where it was, by the same command.",
     )
-    parser.add_argument("--machines", type=int, default=20, metavar="N", help="how many")
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="which")
-    parser.add_argument("--jobs", type=int, metavar="J", help="at a time; all cores by default")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, host:port")
     parser.add_argument(
-        "--foreign", type=Path, metavar="FILE", help="Python: effects that no catalogue holds"
+        "--machines", type=int, default=20, metavar="N", help="how many; default 20"
     )
-    parser.add_argument("--only", default="", metavar="NAME,NAME", help="draw from these effects")
+    parser.add_argument(
+        "--seed", type=int, default=1, metavar="S",
+        help="which machines: the same number, the same machines; default 1",
+    )  # fmt: skip
+    parser.add_argument(
+        "--jobs", type=int, metavar="J", help="machines at a time; default: as many as cores"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="host:port of a Dask cluster that does the work (extra `cluster`)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--foreign", type=Path, metavar="FILE",
+        help="Python file with effects that no catalogue holds, hidden, too",
+    )  # fmt: skip
+    parser.add_argument(
+        "--only", default="", metavar="NAME,NAME", help="hide these effects alone; default: any"
+    )
     parser.add_argument(
         "--varied", action="store_true", help="each machine of another size, with other sensors"
     )
@@ -34,12 +50,15 @@ def arguments(words: list[str]) -> argparse.Namespace:
     )
     usual = " or ".join(f"{sort.usual:g} {sort.unit}" for sort in (BOOM, ACTUATOR))
     parser.add_argument(
-        "--duration", type=float, metavar="D", help=f"of a recording; {usual} of an actuator"
-    )
+        "--duration", type=float, metavar="D",
+        help=f"of a recording; default {usual} of an actuator",
+    )  # fmt: skip
     parser.add_argument(
-        "--log", type=Path, metavar="FILE", help="one JSON line per machine; continued if there"
-    )
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="leave the recordings there")
+        "--log", type=Path, metavar="FILE",
+        help="one JSON line for each machine; one that exists is continued. Default:"
+        " blind-SEED.jsonl in the current folder",
+    )  # fmt: skip
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings there")
     return parser.parse_args(words)
 
 

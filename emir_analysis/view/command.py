@@ -21,11 +21,14 @@ HOST = "127.0.0.1"  # nobody else's business
 
 def command(words: list[str], live: Callable[[list[str]], int]) -> int:
     """Serve a recording, or hand over to `live`, which knows ROS."""
-    parser = argparse.ArgumentParser(prog="emir view", description=__doc__)
+    parser = argparse.ArgumentParser(prog="emir view", description=(
+        "A recording or the running graph as a page in the browser, served to this computer alone"
+        " until Ctrl-C. Needs the extra `view` (docs/view.md)."
+    ))  # fmt: skip
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--bag", type=Path, help="a recording of the graph")
-    source.add_argument("--live", action="store_true", help="the graph that is running")
-    parser.add_argument("--model", help="with --live: joint1 (default) or robot")
+    source.add_argument("--bag", type=Path, metavar="BAG", help="a recording of the graph")
+    source.add_argument("--live", action="store_true", help="the running graph; needs ROS 2")
+    parser.add_argument("--model", metavar="NAME", help="with --live: joint1 (default) or robot")
     parser.add_argument("--port", type=int, default=8080, help="of the page, default 8080")
     options = parser.parse_args(words)
     if options.live:

@@ -10,6 +10,7 @@ the frames of all links, bent as the arm is, for RViz and Foxglove.
 
 import sys
 from pathlib import Path
+from typing import List  # noqa: UP035 (see TEXTS)
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
@@ -25,6 +26,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 PACKAGE = "emir_ros"
+TEXTS = List[str]  # noqa: UP006 (launch takes list[str] for none)
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -43,16 +45,40 @@ def generate_launch_description() -> LaunchDescription:
             _argument("model", "joint1", "joint1, or robot: the whole robot, cascade or pfc"),
             _argument("params", parameters, "YAML file with the nodes' parameters"),
             _argument("transforms", "false", "frames on /tf, by robot_state_publisher"),
-            _node("recorder_node", {"bag": LaunchConfiguration("bag")}),
+            _node("recorder_node", _recorded(controller, second)),
             _node("plant_node"),
             _node("force_loop_node", {"standby": as_bool}, _if_damped(controller, second)),
             _node([controller, "_node"], {"standby": as_bool}),
             _node([second, "_node"], {"standby": True}, if_two),
-            _node("selector_node", {"controller": controller}, if_two),
+            _node("selector_node", _chosen_from(controller, second), if_two),
             _node("trajectory_node"),
             _transforms(),
         ]
     )
+
+
+def _recorded(controller: LaunchConfiguration, second: LaunchConfiguration) -> dict[str, object]:
+    """Return the recorder's parameters: what the recording says of itself."""
+    nodes = [
+        "['plant_node', 'trajectory_node', '", controller, "_node']",
+        " + (['", second, "_node', 'selector_node'] if '", second, "' else [])",
+        " + (['force_loop_node'] if ", *_damped(controller, second), " else [])",
+    ]  # fmt: skip
+    about = [
+        '{"model": "', LaunchConfiguration("model"), '", "controller": "', controller,
+        '", "standby": "', second, '", "time": "realtime"}',
+    ]  # fmt: skip
+    return {
+        "bag": LaunchConfiguration("bag"),
+        "nodes": ParameterValue(PythonExpression(nodes), value_type=TEXTS),
+        "description": ParameterValue(about, value_type=str),
+    }
+
+
+def _chosen_from(controller: LaunchConfiguration, second: LaunchConfiguration) -> dict[str, object]:
+    """Return the selector's parameters."""
+    both = PythonExpression(["['", controller, "', '", second, "']"])
+    return {"controller": controller, "controllers": ParameterValue(both, value_type=TEXTS)}
 
 
 def _transforms() -> Node:
@@ -75,9 +101,12 @@ def _transforms() -> Node:
 
 
 def _if_damped(controller: LaunchConfiguration, second: LaunchConfiguration) -> IfCondition:
+    return IfCondition(PythonExpression(_damped(controller, second)))
+
+
+def _damped(controller: LaunchConfiguration, second: LaunchConfiguration) -> list[object]:
     """Return whether the force loop is there: lqg or mpc alone gives the valve command itself."""
-    words = ["'", second, "' != '' or '", controller, "' not in ('lqg', 'mpc')"]
-    return IfCondition(PythonExpression(words))
+    return ["('", second, "' != '' or '", controller, "' not in ('lqg', 'mpc'))"]
 
 
 def _argument(

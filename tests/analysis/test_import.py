@@ -135,6 +135,27 @@ def test_rows_without_times_are_samples(tmp_path: Path, capsys: pytest.CaptureFi
     assert "column u" in capsys.readouterr().out
 
 
+def test_blank_lines_before_the_header_do_not_hide_what_separates(tmp_path: Path) -> None:
+    (tmp_path / "map.yaml").write_text('u: {column: u, topic: /u, field: data, unit: "1"}\n')
+    table = _table(tmp_path, "\n# of the rig\n\nu;w\n1,5;2\n2,5;3\n")
+    words = ["import", str(table), "--signals", str(tmp_path / "map.yaml")]
+    assert main([*words, "--out", str(tmp_path / "bag")]) == 0
+
+
+@pytest.mark.parametrize("period", ["1e9", "1e-10"])
+def test_a_period_that_no_stamp_can_tell_is_refused(
+    period: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "map.yaml").write_text(
+        f"time: {{period: {period}, unit: s}}\n"
+        'u: {column: u, topic: /u, field: data, unit: "1"}\n'
+    )
+    table = _table(tmp_path, "u\n" + "1\n" * 10)
+    words = ["import", str(table), "--signals", str(tmp_path / "map.yaml")]
+    assert main([*words, "--out", str(tmp_path / "bag")]) == 1
+    assert "period: " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -149,6 +170,7 @@ def test_rows_without_times_are_samples(tmp_path: Path, capsys: pytest.CaptureFi
         ("t,p,x,x,v\n0,1,2,2,3\n", "more than one column x"),
         ("t,p,x,v\n1,1,2,3\n1,1,2,3\n", "t does not increase at row 1"),
         ("t,p,x,v\n-5,1,2,3\n1,1,2,3\n", "a stamp holds 0"),
+        ("t,p,x,v\n1,1,2,3\n1.0000000001,1,2,3\n", "t: rows are less than 1e-09 s apart"),
         ("", "empty"),
     ],
 )

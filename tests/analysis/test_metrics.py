@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,21 @@ def test_several_recordings_make_one_table(
         for metric in analyze(bag).metrics:
             assert table.loc[str(bag), f"{metric.name} [{metric.unit}]"] == metric.value
     assert set(table["controller"]) == {"cascade"}
+
+
+def test_a_recording_that_begins_in_mid_move_has_no_deflection_at_rest() -> None:
+    whole = _run(0.5, 0.1)
+    late = {
+        name: _signal(name, s.unit, s.time[s.time >= 3.0], s.value[s.time >= 3.0])
+        for name, s in whole.signals.items()
+    }
+    before = late["tcp_deflection"]
+    late["tcp_deflection"] = _signal(
+        "tcp_deflection", "m", before.time[before.time > 3.5], before.value[before.time > 3.5]
+    )
+    figures = {m.name: m.value for m in metrics(replace(whole, signals=late))}
+    assert figures["tcp_deflection_static"] is figures["tcp_deflection_up"] is None
+    assert figures["tracking_error_peak"] is not None
 
 
 def test_a_recording_of_something_else_is_refused(shared: Path) -> None:

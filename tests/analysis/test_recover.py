@@ -86,6 +86,9 @@ def test_all_before_a_damage_is_saved_and_the_damage_told(
     content = bytearray((bag / "cut_0.mcap").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (bag / "cut_0.mcap").write_bytes(content)
+    for reader in ("info", "analyze"):
+        assert main([reader, str(bag)]) == 1
+        assert "cut_0.mcap: damaged" in capsys.readouterr().err
     assert main(["bag", "recover", str(bag), "--out", str(tmp_path / "whole")]) == 0
     told = capsys.readouterr()
     assert "damaged" in told.err

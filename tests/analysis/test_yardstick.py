@@ -169,3 +169,5 @@ def test_yardstick_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert content["draws"][0]["scores"]["cascade"]["ratio"] > 1.0
     assert main(["yardstick", "--draws", "0"]) == 1
     assert "draws = 0: at least 1" in capsys.readouterr().err
+    assert main(["yardstick", "--seed", "-1"]) == 1
+    assert "seed = -1: 0 or more" in capsys.readouterr().err

@@ -97,6 +97,8 @@ def test_numbers_of_a_joint_state_belong_to_the_names_beside_them() -> None:
     )
     told = conversions.values(states, given)
     assert [told[f"{joint}_angle"] for joint in JOINTS] == [0.1 * k for k in range(6)]
+    given.effort = [5.0, 6.0]  # of whom nobody knows
+    assert conversions.values(states, given) == told
     given.name[1] = "another"
     with pytest.raises(LookupError, match=f"no {JOINTS[-1]}, but gripper, another"):
         conversions.values(states, given)

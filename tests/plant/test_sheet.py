@@ -146,6 +146,29 @@ def test_what_the_data_sheet_does_not_mention_is_not_there(shared: Path) -> None
     assert chambers.relief_flow(1e8, Plant(sheet.machine).record[0]) == 0.0
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("? [a]\n: 1\n", "not YAML"),
+        ("a: 2024-13-01\n", "not YAML: month must be in 1..12"),
+        ("a: !!int x\n", "not YAML"),
+        ("a: " + "[" * 2000 + "]" * 2000 + "\n", "not YAML: nested too deep"),
+    ],
+)
+def test_what_the_yaml_library_trips_over_is_one_line(text: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "odd.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=said) as told:
+        load_sheet(file)
+    assert "\n" not in str(told.value)
+
+
+def test_a_fraction_is_not_cut_off_where_a_whole_number_is_wanted() -> None:
+    with pytest.raises(ParameterError, match=r"sensors\.resolver_bits = 12\.7: not a whole number"):
+        with_values(joint1(), {"sensors.resolver_bits": 12.7})
+    assert with_values(joint1(), {"sensors.resolver_bits": 13.0}).sensors.resolver_bits == 13
+
+
 def test_a_dotted_name_is_its_group_and_name(tmp_path: Path) -> None:
     file = tmp_path / "rig.yaml"
     file.write_text(

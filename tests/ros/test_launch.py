@@ -1,5 +1,6 @@
 """The launch file starts every node that `ros2 run` finds. Stand-ins replace ROS's launch."""
 
+import json
 import runpy
 import sys
 from pathlib import Path
@@ -46,6 +47,40 @@ def test_every_executable_is_started(launch: MagicMock) -> None:
     chosen = {"<controller>_node", "<standby>_node"}
     assert started - chosen | outer | beside == executables
     assert chosen <= started
+
+
+def _expressions(launch: MagicMock, controller: str, standby: str) -> list[object]:
+    """What the launch file's Python expressions are with these two arguments."""
+    given = {"<controller>": controller, "<standby>": standby}
+    texts = [
+        "".join(given.get(word, word) for word in call.args[0])
+        for call in launch.PythonExpression.call_args_list
+    ]
+    return [eval(text, {"__builtins__": {}}) for text in texts]  # noqa: S307 (as launch does)
+
+
+@pytest.mark.parametrize(
+    ("controller", "standby", "nodes"),
+    [
+        ("cascade", "", {"cascade_node", "force_loop_node"}),
+        ("lqg", "", {"lqg_node"}),
+        ("pfc_tip", "pfc", {"pfc_tip_node", "pfc_node", "selector_node", "force_loop_node"}),
+    ],
+)
+def test_the_recording_and_the_selector_know_who_runs(
+    launch: MagicMock, controller: str, standby: str, nodes: set[str]
+) -> None:
+    expressions = _expressions(launch, controller, standby)
+    (recorded,) = [e for e in expressions if isinstance(e, list) and "plant_node" in e]
+    assert set(recorded) == nodes | {"plant_node", "trajectory_node"}
+    assert [controller, standby] in expressions  # between whom to choose
+    (about,) = [
+        call.args[0]
+        for call in launch.ParameterValue.call_args_list
+        if call.kwargs["value_type"] is str and isinstance(call.args[0], list)
+    ]
+    told = json.loads("".join(about).replace("<controller>", controller))
+    assert told["controller"] == controller
 
 
 def test_every_configuration_is_a_declared_argument(launch: MagicMock) -> None:

@@ -135,6 +135,16 @@ def test_the_speed_can_be_changed_on_the_way() -> None:
     assert time.monotonic() - started < 0.5 * 32.0  # at a tenth it would have taken 32 s
 
 
+@pytest.mark.usefixtures("ros")
+def test_a_recording_damaged_from_the_start_is_one_line(tmp_path: Path) -> None:
+    content = bytearray(next(OWN_BAG.glob("*.mcap")).read_bytes())
+    content[30_000:30_100] = bytes(100)  # in the first of its chunks
+    file = tmp_path / "damaged.mcap"
+    file.write_bytes(content)
+    with pytest.raises(ParameterError, match=r"replay_node: .*damaged\.mcap: damaged"):
+        ReplayNode(["--ros-args", "-p", f"bag:={file}"])
+
+
 BAD = {
     "no bag": ("bag:=''", "bag: the recording to replay is missing"),
     "nowhere": ("bag:=nowhere", "nowhere: no such recording"),

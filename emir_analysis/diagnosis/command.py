@@ -55,22 +55,10 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     inputs = [datasheet, signals, *bags, *judges]
     check_outputs([json, model_out, html], predictions, inputs)
     sheet = load_sheet(datasheet or data("joint1.yaml"))
-    missing = [path for path in judges if not path.exists()]
-    if missing:
-        raise InputError(f"{missing[0]}: no such recording")
-    learned = {path.resolve() for path in bags}
-    if len(learned) < len(bags):
-        raise InputError(f"{', '.join(map(str, bags))}: the same recording twice")
-    for path in judges:
-        if path.resolve() in learned:
-            progress(f"{path}: judged on what was learned from: no measure of other recordings")
+    _check_recordings(bags, judges, progress)
     signal_map = None if signals is None else _checked_map(signals)
-    for file, unread in (
-        (datasheet, sheet.ignored),
-        (signals, [name for name in signal_map or () if name not in SIGNALS]),
-    ):
-        if unread:
-            progress(f"{file}: not used: {', '.join(unread)}")
+    _tell_unread(datasheet, sheet.ignored, progress)
+    _tell_unread(signals, [name for name in signal_map or () if name not in SIGNALS], progress)
     experiments = [_opened(each, signal_map, sheet.machine, progress) for each in bags]
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
@@ -92,6 +80,23 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     if failed:
         raise IncompleteError(result, failed)
     return result
+
+
+def _check_recordings(bags: Sequence[Path], judges: Sequence[Path], progress: Progress) -> None:
+    missing = [path for path in judges if not path.exists()]
+    if missing:
+        raise InputError(f"{missing[0]}: no such recording")
+    learned = {path.resolve() for path in bags}
+    if len(learned) < len(bags):
+        raise InputError(f"{', '.join(map(str, bags))}: the same recording twice")
+    for path in judges:
+        if path.resolve() in learned:
+            progress(f"{path}: judged on what was learned from: no measure of other recordings")
+
+
+def _tell_unread(file: Path | None, unread: Sequence[str], progress: Progress) -> None:
+    if unread:
+        progress(f"{file}: not used: {', '.join(unread)}")
 
 
 def _checked_map(signals: Path) -> SignalMap:

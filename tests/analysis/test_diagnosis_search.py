@@ -12,7 +12,7 @@ from operated import moved, operated, without
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
-from emir_analysis.diagnosis.black_box import train
+from emir_analysis.diagnosis.black_box import train, train_one_step
 from emir_analysis.diagnosis.candidates import (
     Trial,
     at_rest,
@@ -24,7 +24,7 @@ from emir_analysis.diagnosis.candidates import (
 from emir_analysis.diagnosis.diagnose import diagnose, loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.free_run import free_runs
+from emir_analysis.diagnosis.free_run import free_runs, rms
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
@@ -578,3 +578,23 @@ def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_
     volume = cylinder.volume_lowering_0 - cylinder.area_lowering * stroke
     lowering = vessel_compliance.lowering(volume, Plant(hoses.machine).record[0])
     assert lowering == pytest.approx(9.3e-11, rel=0.06)
+
+
+def test_a_black_box_learns_from_recordings_of_different_sampling() -> None:
+    """A second recording with twice as many samples as the first says what it says without."""
+
+    def thinned(experiment: Experiment) -> Experiment:
+        return replace(
+            experiment,
+            period=2.0 * experiment.period,
+            angle=experiment.angle[::2],
+            outputs=experiment.outputs[::2],
+            rest=experiment.rest // 2,
+        )
+
+    first, second = thinned(moved(joint1(), seed=5)), moved(joint1(), seed=6)
+    mixed = train_one_step(Evidence([first, second], joint1()))
+    alike = train_one_step(Evidence([first, thinned(second)], joint1()))
+    assert mixed.period == alike.period == first.period
+    errors = [mixed.one_step(second), alike.one_step(thinned(second))]
+    assert rms(errors[0] - errors[1]) == pytest.approx(0.0, abs=1e-3 * rms(errors[1]).max())

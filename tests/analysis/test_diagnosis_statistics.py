@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from emir_analysis.diagnosis.free_run import block_medians
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 
 PERIOD, SLOW = 0.05, 1.4  # s
@@ -33,3 +34,13 @@ def test_what_the_input_explains_is_seen_at_its_delay() -> None:
     late = np.concatenate([np.zeros(20), command[:-20]])
     assert input_correlation(noise, command, PERIOD, SLOW) < 0.2
     assert input_correlation(late + noise, command, PERIOD, SLOW) == pytest.approx(0.7, abs=0.1)
+
+
+def test_recordings_of_different_sampling_count_by_their_time() -> None:
+    """60 s of error 1 at 100 Hz beside 75 s of error 3 at 10 Hz: four blocks beside five."""
+    errors, periods = [np.full((6000, 1), 1.0), np.full((750, 1), 3.0)], [0.01, 0.1]
+    assert block_medians(errors, periods) == 3.0
+    (found,) = rms_intervals(errors, periods)
+    middle = np.sqrt((12 * 1.0 + 15 * 9.0) / 27)  # of blocks of 5 s
+    assert found.low < middle < found.high
+    assert found.high < 2.8

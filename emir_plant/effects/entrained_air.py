@@ -14,7 +14,8 @@ ATMOSPHERE = 1e5  # Pa, at which the gas share is stated
 class EntrainedAir(Effect):
     """Stiffness of the mixture, E_l [1 + g] / [1 + g E_l / (n p)], g = a (p_a/p)^(1/n).
 
-    E_l is the cylinder's beta, p the absolute pressure, p_a one atmosphere.
+    E_l is the cylinder's beta, p the absolute pressure or `least_pressure` where that is more, p_a
+    one atmosphere: below, oil that evaporates keeps the bubbles from growing on.
     """
 
     balance: ClassVar[Balance] = "chambers"
@@ -24,6 +25,9 @@ class EntrainedAir(Effect):
 
     share: float = quantity("1", 0.0, 0.2, "a, gas volume share at 1 bar", default=0.0)
     exponent: float = quantity("1", 1.0, 1.4, "n, polytropic exponent", default=1.2)
+    least_pressure: float = quantity(
+        "Pa", 1e2, 1e5, "below which the bubbles grow no further", default=3e3
+    )
 
 
 @compiled
@@ -31,7 +35,7 @@ def stiffness(pressure: float, p: Any) -> float:
     """Return the effective stiffness of a chamber's content, Pa, at an absolute pressure, Pa."""
     if p.entrained_air_share == 0.0:
         return p.beta
-    absolute = max(pressure, 0.01 * ATMOSPHERE)  # oil vapour keeps a bubble from growing on
+    absolute = max(pressure, p.entrained_air_least_pressure)
     n = p.entrained_air_exponent
     gas = p.entrained_air_share * (ATMOSPHERE / absolute) ** (1.0 / n)
     return p.beta * (1.0 + gas) / (1.0 + gas * p.beta / (n * absolute))

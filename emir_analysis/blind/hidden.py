@@ -301,13 +301,17 @@ class EntrainedAir(Hidden):
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
-        """Draw up to 3 % of the volume."""
-        return {"air": between(random, 0.003, 0.03), "polytropic": random.uniform(1.0, 1.4)}
+        """Draw up to 3 % of the volume, and below which pressure it stays as it is."""
+        return {
+            "air": between(random, 0.003, 0.03),
+            "polytropic": random.uniform(1.0, 1.4),
+            "swells_down_to": between(random, 5e2, 2e4),
+        }
 
     def stiffness(self, pressure: float, volume: float, *, lifting: bool) -> float:
         """Return the bulk modulus of both in series."""
         oil = super().stiffness(pressure, volume, lifting=lifting)
-        p, n = max(pressure, 1e3), self.sizes["polytropic"]
+        p, n = max(pressure, self.sizes["swells_down_to"]), self.sizes["polytropic"]
         gas = self.sizes["air"] * math.pow(ATMOSPHERE / p, 1.0 / n)
         share = gas / (1.0 + gas)
         return 1.0 / ((1.0 - share) / oil + share / (n * p))

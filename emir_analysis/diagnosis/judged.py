@@ -14,9 +14,10 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import explained
-from emir_analysis.diagnosis.select import at_noise, leaves_quiet
+from emir_analysis.diagnosis.free_run import rms
+from emir_analysis.diagnosis.select import EXPLAINED, at_noise, leaves_quiet
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -72,10 +73,19 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     ahead = black_box.train_one_step(findings.evidence)
     runs[BLACK_BOX] = [_spread(free.free_run(e), evidence) for e in evidence.experiments]
     one_step[BLACK_BOX] = [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
-    surprising = not explained(findings.chosen, evidence)
-    reconciled = surprising and findings.verdict == "nothing_missing"
-    reconciled = reconciled and _reconciled(findings, evidence)
+    surprising, reconciled = not explained(findings.chosen, evidence), False
+    if findings.verdict == "nothing_missing":
+        surprising = surprising or loudest_signal(findings.chosen.machine, evidence)[1] > EXPLAINED
+        reconciled = surprising and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
+
+
+def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:
+    """Return the signal whose free run is furthest off, and its RMS error in units of its noise."""
+    left = rms(np.concatenate(free_run_errors(machine, evidence)))
+    names = [name for name, shown in zip(OUTPUTS, evidence.shown, strict=True) if shown]
+    worst = int(np.argmax(left))
+    return names[worst], float(left[worst])
 
 
 def _reconciled(findings: Findings, judge: Evidence) -> bool:

@@ -13,7 +13,7 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged
+from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.shape import TOLD, Shape
@@ -162,6 +162,9 @@ def _judgement(findings: Findings, judged: Judged) -> str:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
     by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
+    if off <= EXPLAINED:  # in one signal alone, then
+        name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
+        by = f"where {name} is {alone:.1f} times its noise off"
     worse = ""
     if findings.chosen.effects and off > judged.off(REFITTED):
         worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"

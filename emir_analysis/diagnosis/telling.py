@@ -46,6 +46,12 @@ MOVEMENTS = {
         *[(y, 1.0) for _ in range(5) for y in (0.2, -0.2)], (0.0, 10.0)
     ),
     "one move and then a minute at rest with both chambers shut": _moves((0.4, 2.0), (0.0, 57.0)),
+    "openings that grow and shrink again without closing (1.5 s each)": _moves(
+        *[(y, 1.5) for y in (0.3, 0.6, 0.3)],
+        (0.0, 3.0),
+        *[(-y, 1.5) for y in (0.3, 0.6, 0.3)],
+        (0.0, 6.0),
+    ),
     "one long move over most of the stroke (10 s)": _moves((0.45, 10.0), (0.0, 9.0)),
 }
 

@@ -134,7 +134,10 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
     ),
     hidden.InternalLeakage: ({"past_piston": 1e-11}, {"coefficient": 1e-11}),
     hidden.ExternalLeakage: ({"leak_lowering": 1e-11}, {"lowering": 1e-11}),
-    hidden.EntrainedAir: ({"air": 0.02, "polytropic": 1.2}, {"share": 0.02, "exponent": 1.2}),
+    hidden.EntrainedAir: (
+        {"air": 0.02, "polytropic": 1.2, "swells_down_to": 5e3},
+        {"share": 0.02, "exponent": 1.2, "least_pressure": 5e3},
+    ),
     hidden.VesselCompliance: ({"hose_lifting": 5e-11}, {"lifting": 5e-11}),
     hidden.SupplyPressureDroop: (
         {"droop": 2e10, "droop_time": 0.2},

@@ -22,7 +22,8 @@ STEPS = 10  # frequencies in the width of a line, one over the recording's lengt
 AT_ONCE = 100  # frequencies: all of a long recording would need memory by its length's square
 HIGHEST = 1.5  # Hz; the balances' windows of half a second show little of what swings faster
 DOUBT = 1.0  # windows of no residual that each bin is taken to have seen besides
-TAKEN = 0.7  # least part of what no static function predicts that a swing has to
+TAKEN = 0.7  # least part of what no static function predicts that a swing has to ...
+STATIC = 0.9  # and the most that one may predict: beyond, whatever moves over its range swings
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def swing(
     found = best_swing(residual, time, predictors)
     left = 1.0 - max(shape.share, 0.0)
     told = found.share >= TOLD and 1.0 - found.share <= (1.0 - TAKEN) * left
-    return found if told else None
+    return found if told and shape.share < STATIC else None
 
 
 def best_swing(residual: Array, time: Array, predictors: dict[str, tuple[str, Array]]) -> Swing:

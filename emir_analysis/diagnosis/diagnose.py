@@ -28,8 +28,9 @@ FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the 
 class Findings:
     """What recordings say about the machine.
 
-    verdict: nothing_missing, found, ambiguous or unexplained. refitted: parameters only, chosen:
-    with the effects named, both fitted to the whole recordings. rejected: the trial whose effects
+    verdict: nothing_missing, found, ambiguous or unexplained. balanced: parameters only, fitted to
+    the balances, refitted: to the free run of the whole recordings, chosen: likewise, with the
+    effects named. rejected: the trial whose effects
     were best among all and yet leave too much. tried: all trials. rivals: those as good as the
     chosen one. residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted`
     and `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks.
@@ -41,6 +42,7 @@ class Findings:
     evidence: Evidence
     sheet: Sheet
     verdict: str
+    balanced: Trial
     refitted: Trial
     chosen: Trial
     rejected: Trial | None
@@ -91,6 +93,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         evidence=evidence,
         sheet=sheet,
         verdict=verdict,
+        balanced=search.balanced,
         refitted=refitted,
         chosen=final,
         rejected=rejected,

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial, free_run_errors
+from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.free_run import rms
@@ -82,7 +83,7 @@ def _of_findings(findings: Findings) -> str:
                     " course over time than those looked for"
                 )
     if findings.verdict == "unexplained":
-        known = "" if findings.rejected is None else f"{closest(findings.rejected)}; "
+        known = "" if findings.rejected is None else _rejected(findings.rejected, findings.evidence)
         left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
         return known + left + of_stamps(findings.evidence.experiments)
     if findings.verdict == "ambiguous":
@@ -108,16 +109,20 @@ def other_reasons(chosen: Trial) -> str:
 
 
 def _from(findings: Findings) -> str:
-    """Return from when on the free run of parameters alone is off."""
+    """Return from when on the free run of parameters alone is off, as quiet balances have them.
+
+    What acts seldom has led those that were fitted to the free run astray, from the start.
+    """
     evidence = findings.evidence
-    each = free_run_errors(findings.refitted.machine, evidence)
+    each = free_run_errors(findings.balanced.machine, evidence)
     for experiment, errors in zip(evidence.experiments, each, strict=True):
         second = max(1, round(1.0 / experiment.period))
         blocks = [rms(errors[k : k + second].ravel()) for k in range(0, len(errors), second)]
         off = np.flatnonzero(np.array(blocks) > DRIFTED)
         if off.size:
             when = float(experiment.time[int(off[0]) * second])
-            return f" from {when:.0f} s of {experiment.name} on"
+            since = f"{when:.0f} s" if when else "the start"
+            return f" from {since} of {experiment.name} on"
     return ""
 
 
@@ -161,7 +166,9 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
-    by = "where it cannot even rest" if math.isnan(off) else f"{off:.1f} times the noise off"
+    by = f"all in all {off:.1f} times the noise off"
+    if math.isnan(off):
+        by = "where it cannot even rest"
     if off <= EXPLAINED:  # in one signal alone, then
         name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
         by = f"where {name} is {alone:.1f} times its noise off"
@@ -253,6 +260,14 @@ def _ends(chosen: Trial) -> tuple[str, ...]:
     """Return what stands at an end of what is allowed; what shapes an effect ends in a limit."""
     together = zip(chosen.unknowns.members, chosen.x, strict=True)
     return tuple(u.path for u, x in together if u.at_end(float(x)) and not u.shapes)
+
+
+def _rejected(rejected: Trial, evidence: Evidence) -> str:
+    """Return what comes closest, how far it is off, and that what follows is said without it."""
+    left = math.sqrt(mean_square(rejected, evidence))
+    off = f" ({left:.1f} times the noise in the free run)" if math.isfinite(left) else ""
+    them = "them" if len(rejected.effects) > 1 else "it"
+    return f"{closest(rejected)}{off}; without {them} "
 
 
 def closest(rejected: Trial) -> str:

@@ -10,8 +10,17 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
     parameter_line,
 )
+from emir_analysis.diagnosis.select import EXPLAINED
 
 ROUNDING = 1e-6  # relative
+LOUD = (
+    ". Look for the cause in the parts of the machine whose balances speak below, at the values and"
+    " times that the pictures of them show."
+)
+QUIET = (
+    ". The balances are quiet: the cause acts seldom, or by hardly more than their noise. Look at"
+    " what happened when the simulated signals depart from the measured ones."
+)
 
 
 def summary(result: Diagnosis) -> str:
@@ -67,10 +76,15 @@ def in_short(result: Diagnosis) -> str:
     came, refitted, after = (f"{error:.3g}" for error in worst.values())
     errors = f"Largest free-run error of a signal on {Path(result.judged_on).name}, times its noise"
     if result.effects:
+        errors += f": {came} by the data sheet, {refitted} with its parameters fitted, {after} with"
+        if worst["with_effect"] > EXPLAINED:
+            return (
+                f"{errors} what was found. That recording shows more: diagnose both together before"
+                " anything is mended."
+            )
         return (
-            f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted, {after}"
-            " with what was found. Mend the machine, or go on with it as it is: --model-out writes"
-            " it, emir run --params simulates it and emir design --from designs for it."
+            f"{errors} what was found. Mend the machine, or go on with it as it is: --model-out"
+            " writes it, emir run --params simulates it and emir design --from designs for it."
         )
     if result.verdict == "nothing_missing":
         return (
@@ -80,8 +94,7 @@ def in_short(result: Diagnosis) -> str:
     return (
         f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted"
         + (f", {after} with the curve that was measured" if result.curve is not None else "")
-        + ". Look for the cause in the parts of the machine whose balances speak below, at the"
-        " values and times that the pictures of them show."
+        + (QUIET if result.shape is None else LOUD)
     )
 
 

@@ -216,32 +216,40 @@ class Search:
     def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
         """Return the best trials, one that sticks, with the friction that a beginning tells.
 
-        The same where that is no better on the whole, where they leave nothing, or where the
-        beginning was asked before.
+        The same where they leave nothing, or where that is no better on the whole.
         """
         if self._excess(best.trial) <= beyond(LEFT):
-            return equal, best
-        start = fullest(best.trial, self._sheet)
-        if start.effects in self._begun:
             return equal, best
         led = self.whole.led(best.trial)
         if led is not None:
             self.whole.keep(led)
             return equal, replace(best, trial=led)
-        self._begun.add(start.effects)
-        self._progress(f"friction by a growing beginning: {best.trial.name}")
-        law = begun(start, self._evidence, self.floor)
-        law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
-        if set(law.effects) == set(best.trial.effects) and at_noise(best.trial, self._evidence):
-            return equal, best
-        found = self.whole.with_friction(law, fuller, best.trial)
-        if self.whole.score(found) > self.whole.score(best.trial) - STRONG:
+        found = self._with_friction(best.trial)
+        if found is None or self.whole.score(found) > self.whole.score(best.trial) - STRONG:
             return equal, best
         self.whole.keep(found)
         self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
         told = self._scored(found, free_run_score(found, self._evidence))
         self.tried.append(told)
         return [found], told
+
+    def _with_friction(self, known: Trial) -> Trial | None:
+        """Return a trial that sticks with the friction that a beginning tells, fitted to the whole.
+
+        None where that was asked before, tells that more than friction is missing, or is the same.
+        """
+        start = fullest(known, self._sheet)
+        if start.effects in self._begun:
+            return None
+        self._begun.add(start.effects)
+        self._progress(f"friction by a growing beginning: {known.name}")
+        law = begun(start, self._evidence, self.floor)
+        if law is None:
+            return None
+        law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
+        if set(law.effects) == set(known.effects) and at_noise(known, self._evidence):
+            return None
+        return self.whole.with_friction(law, fuller, known)
 
     def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
         """Return pairs of effects, the most promising first.

@@ -45,7 +45,8 @@ EARLY = 20.0  # s, a beginning whose fit knows least of what it leaves open ...
 DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
-LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too
+LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too ...
+OFF = 1.5  # and from which on something else is missing: right laws leave 0.92 to 1.05
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-3  # relative, of the free run's squared error
 ROUGH = 1e-2  # the same of a fit to go on from, or to tell only whether half of the rest is gone
@@ -53,16 +54,19 @@ ROUGH = 1e-2  # the same of a fit to go on from, or to tell only whether half of
 Method = Callable[[Problem, float], Solution]
 
 
-def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial:
+def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 
     Over the first beginning it is fitted from those shapes of the friction near standstill whose
     free run is best there. The best fits are led on, fewer each time: it takes some sticks to
     tell two minima apart. Where that leaves more than LEFT, it is begun with friction that comes
-    gradually, too: fitted by tanh, that has led to another minimum. floor: (5,) what the sensors
-    leave in each balance.
+    gradually, too: fitted by tanh, that has led to another minimum. None where more than OFF is
+    left: that is no matter of how friction begins. floor: (5,) what the sensors leave in each
+    balance.
     """
     found = _begun(start, evidence, floor)
+    if found.misfit > OFF:
+        return None
     if found.misfit > LEFT:
         slow = gradual(start)
         other = _begun(slow, evidence, floor)

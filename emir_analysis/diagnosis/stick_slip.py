@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import BEHIND, Trial, free_run_problem, shapes
+from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import (
@@ -47,6 +47,7 @@ WIDER = 2.0  # times, every second time: over rough errors slopes promise too li
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too ...
 OFF = 1.5  # and from which on something else is missing: right laws leave 0.92 to 1.05
+WORSE = 1.1  # times what a rival leaves over a beginning: none that leaves more can replace it
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-3  # relative, of the free run's squared error
 ROUGH = 1e-2  # the same of a fit to go on from, or to tell only whether half of the rest is gone
@@ -137,7 +138,7 @@ def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
 def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Trial:
     """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole.
 
-    It is given up where it falls far behind a rival that was fitted to more than that beginning.
+    It is given up where it falls behind a rival that was fitted to more than that beginning.
     """
     end = max(float(e.time[-1]) for e in evidence.experiments)
     x = _at_rest(known, evidence)
@@ -193,7 +194,7 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
             part = evidence.until(longer)
             fitted = _found_again(known, part, fitted, method, draws if holds else 1)
             holds = holds and fitted.misfit <= AS_BEFORE * before
-            if rival is not None and fitted.misfit > BEHIND * _misfit(rival, part):
+            if rival is not None and fitted.misfit > WORSE * _misfit(rival, part):
                 break
         time = longer
     return fitted

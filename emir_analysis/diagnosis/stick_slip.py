@@ -9,6 +9,7 @@ so the fullest law is fitted, and what is not needed is left out.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -135,14 +136,26 @@ def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
     return score(channels, evidence.duration(1.0) / BLOCK, fitted.x.size)
 
 
-def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Trial:
+class Grown(NamedTuple):
+    """A trial fitted to a beginning that grew, and the RMS error that was left, in the noise.
+
+    With the state at rest that was fitted along: where it sticks, a fiftieth of what the sensors
+    leave open may part two runs.
+    """
+
+    trial: Trial
+    left: float
+
+
+def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Grown:
     """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole.
 
     It is given up where it falls behind a rival that was fitted to more than that beginning.
     """
     end = max(float(e.time[-1]) for e in evidence.experiments)
     x = _at_rest(known, evidence)
-    return known.continued(_led(known, evidence, x, DECIDED, end, descended, rival))
+    fitted = _led(known, evidence, x, DECIDED, end, descended, rival)
+    return Grown(known.continued(fitted), fitted.misfit)
 
 
 def follows_the_beginning(known: Trial, evidence: Evidence) -> bool:

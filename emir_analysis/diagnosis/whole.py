@@ -27,7 +27,7 @@ from emir_analysis.diagnosis.friction_laws import (
     without_breakaway,
 )
 from emir_analysis.diagnosis.screening import LOAD
-from emir_analysis.diagnosis.select import STRONG, at_noise, beyond, excess, free_run_score
+from emir_analysis.diagnosis.select import AT_NOISE, STRONG, beyond, excess, free_run_score
 from emir_analysis.diagnosis.stick_slip import follows_the_beginning, grown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -54,8 +54,9 @@ class Whole:
         """Return a trial fitted to the free run of the whole recordings."""
         if chosen.effects not in self._known:
             self._progress(f"fitting to the whole recording: {chosen.name}")
-            fitted = self.led(chosen) or refine_free_run(chosen, self._evidence)
-            if beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
+            led = self.led(chosen)
+            fitted = led or refine_free_run(chosen, self._evidence)
+            if led is None and beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
                 fitted = self._with_fewer_sizes(fitted)
                 if sticks(fitted):
                     fitted = self._led_again(fitted)
@@ -74,7 +75,7 @@ class Whole:
         if not follows_the_beginning(chosen, self._evidence):
             return None
         led = grown(chosen, self._evidence)
-        return led if self._excess(led) <= beyond(LEFT) else None
+        return led.trial if led.left <= LEFT else None
 
     def _refined_again(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from where it ended, as long as that helps much.
@@ -93,7 +94,7 @@ class Whole:
 
         Over all of a recording at once a fit ends close to where it began.
         """
-        return min(fitted, grown(fitted, self._evidence), key=self.score)
+        return min(fitted, grown(fitted, self._evidence).trial, key=self.score)
 
     def _with_fewer_sizes(self, full: Trial) -> Trial:
         """Return a trial with one size of its effects alone where that is better than with all.
@@ -210,19 +211,18 @@ class Whole:
         A break-away may show in later sticks than those of the beginning, and whether friction
         comes by tanh or gradually shows in many sticks only.
         """
-        found = self._heard(grown(law, self._evidence, rival))
-        off = beyond(LEFT) < self._excess(found) < beyond(HOPELESS)
-        if off and not is_gradual(law):
-            other = self._heard(grown(gradual(law), self._evidence, rival))
-            if self.score(other) < self.score(found):
+        found = grown(law, self._evidence, rival)
+        if LEFT < found.left < HOPELESS and not is_gradual(law):
+            other = grown(gradual(law), self._evidence, rival)
+            if other.left < found.left:
                 found, fuller = other, [gradual(more) for more in fuller]
         for more in fuller:
-            if at_noise(found, self._evidence):
+            if found.left <= AT_NOISE:
                 break
-            led = self._heard(grown(more, self._evidence, rival))
-            if at_noise(led, self._evidence):
+            led = grown(more, self._evidence, rival)
+            if led.left <= AT_NOISE:
                 found = led
-        return found
+        return self._heard(found.trial)
 
     def _heard(self, led: Trial) -> Trial:
         """Return a trial without viscous friction that has become too small to be heard.

@@ -9,11 +9,20 @@ from operated import operated
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import stick_slip
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, free_run_errors, trial
+from emir_analysis.diagnosis.candidates import (
+    Trial,
+    fit_balances,
+    fit_free_run,
+    free_run_errors,
+    trial,
+)
+from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution
 from emir_analysis.diagnosis.friction_laws import fullest, is_gradual, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
+from emir_analysis.diagnosis.select import at_noise
 from emir_analysis.diagnosis.stick_slip import FIRST, STARTS, begun, grown, with_less_friction
+from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 
@@ -36,7 +45,8 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
     law = begun(fullest(known, sheet), evidence, searched.floor)
     assert with_less_friction(law, evidence, sheet, searched.floor) == [law]
-    found = grown(law, evidence)
+    found, left = grown(law, evidence)
+    assert left < 1.03
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
     stribeck = found.machine.effects.stribeck_friction
@@ -71,7 +81,7 @@ def test_no_more_friction_stays_than_there_is() -> None:
     searched, sheet, evidence = search(SLIDING)
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
-    fitted = grown(law, evidence)
+    fitted, _ = grown(law, evidence)
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -102,6 +112,47 @@ def test_friction_is_begun_gradually_where_tanh_leaves_more_than_the_noise(
     monkeypatch.setattr(stick_slip, "_begun", fitted)
     law = begun(start, evidence, searched.floor)
     assert law.machine.effects.stribeck_friction.gradual_share == share
+
+
+def test_what_is_far_off_over_the_beginning_is_no_matter_of_friction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched, sheet, evidence = search({})
+    start, tried = fullest(trial(sheet, ()), sheet), []
+
+    def fitted(law: Trial, *_: object) -> Solution:
+        tried.append(law)
+        return Solution(law.x, np.eye(law.x.size), 2.3, np.eye(law.x.size))
+
+    monkeypatch.setattr(stick_slip, "_begun", fitted)
+    assert begun(start, evidence, searched.floor) is None
+    assert len(tried) == 1  # not gradually, either
+
+
+def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction by the load in the machine, Coulomb's is led along; the rival has the truth."""
+    load = {
+        "effects.pressure_dependent_friction.coefficient": 0.08,
+        "effects.pressure_dependent_friction.smoothing_speed": 1e-3,
+    }
+    searched, sheet, evidence = search(load)
+    wrong = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
+    right = fit_balances(trial(sheet, ("pressure_dependent_friction",)), evidence, searched.floor)
+    right = fit_free_run(right, evidence)
+    assert at_noise(right, evidence)
+    whole = max(float(e.time[-1]) for e in evidence.experiments)
+    monkeypatch.setattr(stick_slip, "DECIDED", 3.0)
+    reached = []
+    errors = stick_slip._errors
+
+    def watched(known: Trial, part: Evidence, points: Array) -> Array:
+        reached.append(float(part.experiments[0].time[-1]))
+        return errors(known, part, points)
+
+    monkeypatch.setattr(stick_slip, "_errors", watched)
+    _, left = grown(wrong, evidence, right)
+    assert left > 1.1
+    assert max(reached) < whole
 
 
 def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:

@@ -30,13 +30,13 @@ class Findings:
 
     verdict: nothing_missing, found, ambiguous or unexplained. balanced: parameters only, fitted to
     the balances, refitted: to the free run of the whole recordings, chosen: likewise, with the
-    effects named. rejected: the trial whose effects
-    were best among all and yet leave too much. tried: all trials. rivals: those as good as the
-    chosen one. residuals: (w, 5) of each balance for the machine as stated (`before`), `refitted`
-    and `after`; floor: (5,) the sensors' share, limit: (5,) from which on a balance speaks.
-    speaking: the balance that no effect takes down to the noise, the loudest or that which swings
-    with time, shape: of its residual, swing: how that swings, where: most of it lies. curve: what
-    has no name, with which `chosen` and `after` then are.
+    effects named. rejected: the trial whose effects were best among all and yet leave too much.
+    tried: all trials. rivals: those as good as the chosen one. residuals: (w, 5) of each balance
+    for the machine as stated (`before`), `refitted` and `after`; floor: (5,) the sensors' share,
+    limit: (5,) from which on a balance speaks. speaking: the balance that no effect takes down to
+    the noise, the loudest or that which swings with time, shape: of its residual, swing: how that
+    swings, where: most of it lies. curve: what has no name, with which `chosen` and `after` then
+    are.
     """
 
     evidence: Evidence

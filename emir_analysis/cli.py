@@ -289,7 +289,7 @@ def _compare(words: list[str]) -> int:
     )  # fmt: skip
     parser.add_argument(
         "--trajectory", default="lift-lower", metavar="NAME",
-        help="of one case: lift-lower (default) or lower-lift",
+        help="lift-lower (default) or lower-lift",
     )  # fmt: skip
     parser.add_argument(
         "--controllers", nargs="+", metavar="NAME",

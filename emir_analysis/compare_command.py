@@ -1,7 +1,7 @@
 """`emir compare`: every controller on the same moves, as one table and one picture."""
 
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.unused_options import check_unused
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import cautions
@@ -43,7 +44,7 @@ def command(options: Namespace, progress: Progress) -> str:
     check_picture(options.picture)
     for mode, usual in MODES.items():
         if getattr(options, mode):
-            _check_nothing_else(options, mode, usual)
+            check_unused(options, usual, f"not with --{mode.replace('_', '-')}")
     if options.damping:
         if options.picture:
             save(damping.picture(joint1()), options.picture)
@@ -64,18 +65,6 @@ def command(options: Namespace, progress: Progress) -> str:
     if options.csv:
         raise InputError(NO_CSV)
     return _one(chosen, cases[0], options, progress)
-
-
-def _check_nothing_else(options: Namespace, mode: str, usual: Mapping[str, object]) -> None:
-    """Raise InputError for an option that a mode has no use for; usual: the defaults of these."""
-    given = [name for name, value in usual.items() if getattr(options, name) != value]
-    if given:
-        names = ", ".join(_as_option(name) for name in given)
-        raise InputError(f"{names}: not with {_as_option(mode)}")
-
-
-def _as_option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def _known(options: Namespace) -> dict[str, Stepping]:

@@ -93,7 +93,7 @@ def results(
     controllers: Mapping[str, Stepping],
     cases: Sequence[Case],
     progress: Callable[[str], None],
-    trajectory: str = "lift-lower",
+    trajectory: str,
 ) -> tuple[list[Result], list[str]]:
     """Return each move of each controller in each case that the machine can do with all of them.
 

@@ -2,7 +2,7 @@
 
 import math
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from emir_analysis import design_lqg
@@ -25,6 +25,7 @@ from emir_analysis.design_pfc import (
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, from_recording
 from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.unused_options import check_unused
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -55,12 +56,12 @@ def command(words: Sequence[str], progress: Callable[[str], None]) -> str:
     if options.controller in design_lqg.CONTROLLERS:
         if recorded:
             raise InputError(f"--controller {options.controller}: a machine's YAML is needed")
-        _check_nothing_else(options, OF_PFC, "pfc and pfc_tip")
+        check_unused(options, OF_PFC, f"of pfc and pfc_tip, not of {options.controller}")
         return design_lqg.command(_machine(options.machine), options, progress)
     if options.controller not in OUTPUTS:
         known = ", ".join((*OUTPUTS, *design_lqg.CONTROLLERS))
         raise ParameterError(f"controller {options.controller!r}: there are {known}")
-    _check_nothing_else(options, OF_LQG, "lqg and mpc")
+    check_unused(options, OF_LQG, f"of lqg and mpc, not of {options.controller}")
     return _pfc(options, progress, recorded=recorded)
 
 
@@ -138,14 +139,6 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="YAML to write")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="the stability map as PNG")
     return parser
-
-
-def _check_nothing_else(options: Namespace, others: Mapping[str, object], whose: str) -> None:
-    """Raise InputError for an option, of others with their defaults, that a design does not use."""
-    given = {name for name, usual in others.items() if getattr(options, name) != usual}
-    if given:
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(given))
-        raise InputError(f"{names}: of {whose}, not of {options.controller}")
 
 
 def _order(given: int | None, usual: int) -> int:

@@ -118,7 +118,7 @@ def _sheet(content: dict[str, Any], *, strict: bool) -> Sheet:
     unknown = [path for path in entries if path not in known]
     headings = {name: entry for name, entry in content.items() if not isinstance(entry, dict)}
     numbers = [name for name, entry in headings.items() if isinstance(entry, int | float)]
-    _check_names(entries, known, numbers if not strict else headings, strict=strict)
+    _check_names(entries, known, headings if strict else numbers, strict=strict)
     stated = {path: entries[path] for path in known if path in entries}
     values = {path: _stated(path, entry, known[path]) for path, entry in stated.items()}
     groups = {name: _group(kind, name, values) for name, kind in kinds.items()}

@@ -104,10 +104,7 @@ class Evidence:
         return np.asarray((residuals / floor)[:, :, self.fitted].reshape(len(residuals), -1))
 
     def one_step(self, machine: Machine) -> list[Array]:
-        """Return measured minus predicted, (n, 4), SI units, of each recording's samples.
-
-        As `Balances.one_step`.
-        """
+        """Return each recording's errors, (n, 4), SI units, as `Balances.one_step`."""
         return [balances.one_step(machine) for balances in self._balances]
 
     @property

@@ -31,7 +31,7 @@ class Judged:
     """What each model says of the judge recordings.
 
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
-    errors (n, 4) of predicting one sample ahead from measured ones in each recording.
+    errors (n, 4) of the change from one sample to the next, of each recording, as in `Balances`.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
     surprising: what was found does not explain them. reconciled: nothing was found missing, and
     other parameters inside the tolerances explain them and the recordings that were fitted.

@@ -23,6 +23,8 @@ def with_a_late_end(loaded: Trial, evidence: Evidence, seen: float) -> Trial:
     load = loaded.machine.effects.external_load
     lasting = np.arange(seen * length, length, STEP) - load.start
     lasting = lasting[(lasting > 0.0) & (lasting < load.duration)]
+    if not lasting.size:
+        return loaded
     points = np.tile(loaded.x, (lasting.size + 1, 1))
     points[1:, k] = [loaded.unknowns.members[k].at(float(duration)) for duration in lasting]
     errors = coarse_errors([loaded.unknowns.at(x) for x in points], evidence)

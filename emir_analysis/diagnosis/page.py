@@ -49,7 +49,7 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
         *_balances(findings, result),
         *_candidates(result),
         *_parameters(findings, result),
-        *error_tests(
+        *tests_of_errors(
             {name: shown[0] for name, shown in SHOWN.items()},
             result.signals,
             result.one_step,
@@ -243,7 +243,7 @@ def _parameters(findings: Findings, result: Diagnosis) -> list[Block]:
     ]
 
 
-def error_tests(
+def tests_of_errors(
     names: dict[str, str],
     signals: dict[str, SignalResult],
     one_step: dict[str, SignalResult],

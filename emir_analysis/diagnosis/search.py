@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
+    LEFT,
     SEEN,
     STRONG,
     at_noise,
@@ -35,7 +36,7 @@ from emir_analysis.diagnosis.select import (
     rivals,
 )
 from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
-from emir_analysis.diagnosis.whole import LEFT, Progress, Whole
+from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 

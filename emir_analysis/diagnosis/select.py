@@ -13,6 +13,7 @@ SEEN = 2.0 / 3.0  # share of each recording, from its start, that the fits see b
 STRONG = 10.0  # difference of two scores that counts as strong evidence (Kass and Raftery 1995)
 SPEAKS = np.sqrt(2.0)  # times the floor: what is systematic is then larger than the noise
 CHANCE = 1e-3  # with which noise alone may make a balance of a short recording speak
+LEFT = 1.03  # times the sensor noise, all signals together: more, and a fit is gone on with
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
 FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balance varies by chance

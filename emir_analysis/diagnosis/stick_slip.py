@@ -25,7 +25,7 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
 )
 from emir_analysis.diagnosis.friction_starts import friction_starts
-from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, STRONG, score
+from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, LEFT, STRONG, score
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -46,8 +46,7 @@ EARLY = 20.0  # s, a beginning whose fit knows least of what it leaves open ...
 DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
-LEFT = 1.03  # times the noise over that, from which on friction is begun gradually, too ...
-OFF = 1.5  # and from which on something else is missing: right laws leave 0.92 to 1.05
+OFF = 1.5  # times the noise over that, from which on more is missing: right laws leave 0.98 at most
 WORSE = 1.1  # times what a rival leaves over a beginning: none that leaves more can replace it
 SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
 ACCURACY = 1e-3  # relative, of the free run's squared error
@@ -139,8 +138,8 @@ def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
 class Grown(NamedTuple):
     """A trial fitted to a beginning that grew, and the RMS error that was left, in the noise.
 
-    With the state at rest that was fitted along: where it sticks, a fiftieth of what the sensors
-    leave open may part two runs.
+    With the state at rest that was fitted along: where it sticks, a sixtieth of half a resolver
+    step may part two runs.
     """
 
     trial: Trial

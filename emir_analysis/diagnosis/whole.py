@@ -27,7 +27,7 @@ from emir_analysis.diagnosis.friction_laws import (
     without_breakaway,
 )
 from emir_analysis.diagnosis.screening import LOAD
-from emir_analysis.diagnosis.select import AT_NOISE, STRONG, beyond, excess, free_run_score
+from emir_analysis.diagnosis.select import AT_NOISE, LEFT, STRONG, beyond, excess, free_run_score
 from emir_analysis.diagnosis.stick_slip import follows_the_beginning, grown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -36,7 +36,6 @@ from emir_plant.sheet import Sheet
 
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
 # in 99 of 100 recordings
-LEFT = 1.03  # RMS error of all signals in units of the noise, from which on a fit is gone on with
 
 Progress = Callable[[str], None]
 

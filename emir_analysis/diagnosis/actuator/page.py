@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
 from emir_analysis.diagnosis.actuator.result import LABELS, ActuatorDiagnosis
-from emir_analysis.diagnosis.page import error_tests
+from emir_analysis.diagnosis.page import tests_of_errors
 from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
 from emir_analysis.signals import Array
 
@@ -71,7 +71,7 @@ def write_page(
                 for path, p in result.parameters.items()
             ],
         ),
-        *error_tests({PRESSURE: "oil pressure"}, result.signals, result.one_step, result.tests),
+        *tests_of_errors({PRESSURE: "oil pressure"}, result.signals, result.one_step, result.tests),
     ]
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
 

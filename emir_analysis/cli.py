@@ -415,9 +415,35 @@ def _figures(words: list[str]) -> int:
 def _diagnose(words: list[str]) -> int:
     # before numpy: matrices here are small, and threads cost more than they gain
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from emir_analysis.diagnosis import actuator, command, summary
+    from emir_analysis.diagnosis import command, summary
     from emir_plant.actuator import is_actuator
 
+    o = _diagnose_parser().parse_args(words)
+    if o.datasheet is not None and is_actuator(o.datasheet):
+        return _diagnose_actuator(o)
+    return _said(summary, lambda: command(
+        o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
+        model_out=o.model_out, predictions=o.predictions,
+    ))  # fmt: skip
+
+
+def _diagnose_actuator(o: argparse.Namespace) -> int:
+    from emir_analysis.diagnosis import actuator
+
+    if o.signals is None:
+        raise InputError(f"{o.datasheet}: an actuator needs --signals")
+    judges = o.judge or [None]
+    if len(o.bag) > 1 or len(judges) > 1:
+        raise InputError(
+            f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one"
+        )
+    return _said(actuator.summary, lambda: actuator.command(
+        o.bag[0], o.datasheet, o.signals, judges[0], json=o.json, html=o.html,
+        model_out=o.model_out, predictions=o.predictions, progress=_progress,
+    ))  # fmt: skip
+
+
+def _diagnose_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="emir diagnose",
         description="What a machine has that its data sheet lacks: nothing_missing, found (which"
@@ -448,23 +474,7 @@ def _diagnose(words: list[str]) -> int:
     parser.add_argument(
         "--predictions", type=Path, metavar="DIR", help="write the simulated runs as MCAP"
     )
-    o = parser.parse_args(words)
-    if o.datasheet is not None and is_actuator(o.datasheet):
-        if o.signals is None:
-            raise InputError(f"{o.datasheet}: an actuator needs --signals")
-        judges = o.judge or [None]
-        if len(o.bag) > 1 or len(judges) > 1:
-            raise InputError(
-                f"{o.datasheet}: an actuator is diagnosed from one recording and judged on one"
-            )
-        return _said(actuator.summary, lambda: actuator.command(
-            o.bag[0], o.datasheet, o.signals, judges[0], json=o.json, html=o.html,
-            model_out=o.model_out, predictions=o.predictions, progress=_progress,
-        ))  # fmt: skip
-    return _said(summary, lambda: command(
-        o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
-        model_out=o.model_out, predictions=o.predictions,
-    ))  # fmt: skip
+    return parser
 
 
 def _said(summary: Callable[[Any], str], work: Callable[[], object]) -> int:

@@ -18,14 +18,14 @@ from emir_analysis.diagnosis.actuator.result import (
     noise_floor,
     stages,
 )
-from emir_analysis.diagnosis.actuator.search import Progress, search
+from emir_analysis.diagnosis.actuator.search import Progress, Search, search
 from emir_analysis.diagnosis.actuator.verdict import verdict
 from emir_analysis.diagnosis.result import write_json
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.import_command import write_signals
 from emir_analysis.outputs import check_outputs, write_all
-from emir_analysis.signals import Array, Source, read_signal_map
-from emir_plant.actuator import load_actuator, write_actuator
+from emir_analysis.signals import Array, SignalMap, Source, read_signal_map
+from emir_plant.actuator import ActuatorSheet, load_actuator, write_actuator
 
 
 def command(  # noqa: PLR0913 - the options of the command, one by one
@@ -57,22 +57,13 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     signal_map = read_signal_map(signals)
     progress(f"reading {bag}")
     record = open_record(bag, signal_map)
-    noise = noise_floor(sheet, record)
-    found = search(sheet, record, noise, progress)
-    if verdict(sheet, found, noise) == "unexplained":
-        progress("measuring what has no name")
-        found = replace(found, curve=measured(sheet, found, record, noise))
+    found = _found(sheet, record, progress)
     machines = stages(sheet, found)
     # frozen before the judge is opened
     as_found = replace(sheet, machine=machines["with_effect"])
     failed = write_all([(model_out, lambda file: write_actuator(file, as_found))])
-    judged = None
-    if judge is not None:
-        progress(f"judging on {judge}")
-        try:
-            judged = open_judge(judge, signal_map, record)
-        except InputError as error:
-            failed.append(InputError(f"{error}; what was found is judged on the same recording"))
+    judged, useless = _judge(judge, signal_map, record, progress)
+    failed += useless
     runs = judged_runs(machines, record, judged)
     shown = record if judged is None else judged
     result = diagnosis(sheet, found, record, judged, runs)
@@ -86,6 +77,29 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     if failed:
         raise IncompleteError(result, failed)
     return result
+
+
+def _found(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
+    """Return the fits of all sets of effects, with a curve where none of them explains all."""
+    noise = noise_floor(sheet, record)
+    found = search(sheet, record, noise, progress)
+    if verdict(sheet, found, noise) == "unexplained":
+        progress("measuring what has no name")
+        found = replace(found, curve=measured(sheet, found, record, noise))
+    return found
+
+
+def _judge(
+    path: Path | None, signal_map: SignalMap, record: ActuatorRecord, progress: Progress
+) -> tuple[ActuatorRecord | None, list[InputError]]:
+    """Return the judge recording, if there is one that can be used, or why it cannot."""
+    if path is None:
+        return None, []
+    progress(f"judging on {path}")
+    try:
+        return open_judge(path, signal_map, record), []
+    except InputError as error:
+        return None, [InputError(f"{error}; what was found is judged on the same recording")]
 
 
 def _write_runs(folder: Path, shown: ActuatorRecord, runs: dict[str, Array]) -> None:

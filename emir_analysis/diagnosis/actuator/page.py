@@ -22,55 +22,15 @@ def write_page(
     path: Path, result: ActuatorDiagnosis, judged: ActuatorRecord, runs: dict[str, Array]
 ) -> None:
     """Write the report as HTML. Raises InputError when the file cannot be written."""
-    s = result.signals[PRESSURE]
-    errors = {name: getattr(s, name) for name in LABELS}
-    balance_rows = [
-        (name, b.noise, b.before, b.refitted, b.after) for name, b in result.balances.items()
-    ]
-    closest = result.candidates[:SHOWN]
     blocks: list[Block] = [
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
         *_effects(result),
         *(_curve(result.curve) if result.curve else []),
-        Heading(f"Free run on {Path(result.judged_on).name}"),
-        Table(
-            ("", "RMS error", "share of the spread"),
-            [(LABELS[n], e, e / result.spread) for n, e in errors.items()],
-            f"Unit: the file's ({s.unit}); noise of the pressure {s.noise:.2g}.",
-        ),
-        Picture(
-            _picture(judged, runs, result.time_unit),
-            "Simulated under the recorded valve opening alone; below, simulated minus measured.",
-        ),
-        Heading("What the balance of the oil lacks"),
-        Table(
-            ("balance", "noise", "data sheet", "re-fitted", "with effects"),
-            balance_rows,
-            "RMS over half a slow period, the measured pressure in every term.",
-        ),
-        Heading("What was tried"),
-        Table(
-            ("effects", "better by", "error on parts left out"),
-            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in closest],
-            "better by: twice the logarithm of how much more probable the recording is than under"
-            " parameters only; 6 are strong. The"
-            f" {len(closest)} closest of {len(result.candidates)} that were tried.",
-        ),
-        Heading("Parameters"),
-        Table(
-            ("parameter", "fitted", "interval", "unit", "confounded with"),
-            [
-                (
-                    path,
-                    p.told[0],
-                    p.interval,
-                    p.unit.replace("time", result.time_unit),
-                    ", ".join(p.confounded_with),
-                )
-                for path, p in result.parameters.items()
-            ],
-        ),
+        *_free_run(result, judged, runs),
+        *_balances(result),
+        *_candidates(result),
+        *_parameters(result),
         *tests_of_errors({PRESSURE: "oil pressure"}, result.signals, result.one_step, result.tests),
     ]
     write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
@@ -107,6 +67,60 @@ def _curve(curve: CurveResult) -> list[Block]:
         ),
         Table((curve.over, curve.what), curve.points, ""),
     ]
+
+
+def _free_run(
+    result: ActuatorDiagnosis, judged: ActuatorRecord, runs: dict[str, Array]
+) -> list[Block]:
+    s = result.signals[PRESSURE]
+    errors = {name: getattr(s, name) for name in LABELS}
+    return [
+        Heading(f"Free run on {Path(result.judged_on).name}"),
+        Table(
+            ("", "RMS error", "share of the spread"),
+            [(LABELS[n], e, e / result.spread) for n, e in errors.items()],
+            f"Unit: the file's ({s.unit}); noise of the pressure {s.noise:.2g}.",
+        ),
+        Picture(
+            _picture(judged, runs, result.time_unit),
+            "Simulated under the recorded valve opening alone; below, simulated minus measured.",
+        ),
+    ]
+
+
+def _balances(result: ActuatorDiagnosis) -> list[Block]:
+    return [
+        Heading("What the balance of the oil lacks"),
+        Table(
+            ("balance", "noise", "data sheet", "re-fitted", "with effects"),
+            [(n, b.noise, b.before, b.refitted, b.after) for n, b in result.balances.items()],
+            "RMS over half a slow period, the measured pressure in every term.",
+        ),
+    ]
+
+
+def _candidates(result: ActuatorDiagnosis) -> list[Block]:
+    closest = result.candidates[:SHOWN]
+    return [
+        Heading("What was tried"),
+        Table(
+            ("effects", "better by", "error on parts left out"),
+            [(c.name, c.score, "" if c.unseen is None else c.unseen) for c in closest],
+            "better by: twice the logarithm of how much more probable the recording is than under"
+            " parameters only; 6 are strong. The"
+            f" {len(closest)} closest of {len(result.candidates)} that were tried.",
+        ),
+    ]
+
+
+def _parameters(result: ActuatorDiagnosis) -> list[Block]:
+    rows = [
+        (path, p.told[0], p.interval, p.unit.replace("time", result.time_unit),
+         ", ".join(p.confounded_with))
+        for path, p in result.parameters.items()
+    ]  # fmt: skip
+    columns = ("parameter", "fitted", "interval", "unit", "confounded with")
+    return [Heading("Parameters"), Table(columns, rows)]
 
 
 def _plain(ax: Axes) -> None:

@@ -149,17 +149,14 @@ def diagnosis(
     curve = as_result(found.curve) if found.curve else None
     judged = record if judge is None else judge
     errors = {name: run - judged.pressure for name, run in runs.items()}
-    shown = _rms(errors["with_effect"]) / noise
-    more = judge is not None and bool(sheet.machine.sensor.pressure_noise) and shown > EXPLAINED
     ahead = one_step_errors(stages(sheet, found), record, judge)
     slow = _slow_period(found)
     chosen = found.chosen
     fitted = _parameters(chosen)
     word = verdict(sheet, found, noise)
     said = statement(word, found, noise, curve)
-    if more and word != "unexplained":
-        word = "unexplained" if word == "nothing_missing" else word
-        said += f"; but {judged.name}, {shown:.1f} times the noise, shows more"
+    if judge is not None and sheet.machine.sensor.pressure_noise:
+        word, said = _judged(word, said, judge.name, _rms(errors["with_effect"]) / noise)
     return ActuatorDiagnosis(
         verdict=word,
         statement=said,
@@ -168,13 +165,7 @@ def diagnosis(
         else (),
         curve=curve,
         rivals=tuple(" + ".join(r.effects) for r in found.rivals if word == "ambiguous"),
-        candidates=tuple(
-            CandidateResult(
-                f.name, 2.0 * (f.evidence - found.plain.evidence), found.unseen.get(f.name)
-            )
-            for f in found.tried
-            if f.effects
-        ),
+        candidates=_candidates(found),
         balances={BALANCE: _balance(stages(sheet, found), slow, record, noise)},
         signals={PRESSURE: _signal(record.unit, noise, errors)},
         one_step={PRESSURE: _signal(record.unit, math.sqrt(2.0) * noise, ahead)},
@@ -186,6 +177,23 @@ def diagnosis(
         recording=record.name,
         judged_on=judged.name,
         judged_from_its_own_start=judge is None or not judge.follows(record),
+    )
+
+
+def _judged(word: str, said: str, judge: str, left: float) -> tuple[str, str]:
+    """Return verdict and statement where a judge recording is left with so much, over its noise."""
+    if left > EXPLAINED and word != "unexplained":
+        word = "unexplained" if word == "nothing_missing" else word
+        said += f"; but {judge}, {left:.1f} times the noise, shows more"
+    return word, said
+
+
+def _candidates(found: Search) -> tuple[CandidateResult, ...]:
+    plain = found.plain.evidence
+    return tuple(
+        CandidateResult(f.name, 2.0 * (f.evidence - plain), found.unseen.get(f.name))
+        for f in found.tried
+        if f.effects
     )
 
 

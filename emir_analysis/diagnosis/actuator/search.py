@@ -56,20 +56,7 @@ def search(
     """
     progress("parameters only")
     plain = fit(sheet, (), record, noise, drawn=DRAWN_ALONE)
-    tried = {_key(plain): plain}
-    left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
-    best = plain
-    while True:
-        breadth = 1 if best.rms <= AT_NOISE * noise else BREADTH
-        parents = [f for f in _first(tried.values(), breadth) if _key(f) not in left]
-        if not parents:
-            break
-        for parent in parents:
-            progress(f"beside: {parent.name}")
-            left.add(_key(parent))
-            found = _neighbours(sheet, record, noise, parent, tried)
-            tried |= {_key(f): f for f in found}
-        best = _first(tried.values(), 1)[0]
+    tried = _climbed(sheet, record, noise, plain, progress)
     progress("the best from each other's machines")
     good = _first(tried.values(), SETTLED)
     machines = [f.machine for f in good]
@@ -88,6 +75,26 @@ def search(
     progress("parts left out")
     unseen = {f.name: unseen_error(sheet, f.effects, record, noise) for f in shown}
     return Search(plain, chosen, tuple(ordered), tuple(rivals), unseen)
+
+
+def _climbed(
+    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, plain: Fitted, progress: Progress
+) -> dict[frozenset[str], Fitted]:
+    """Return the sets tried from parameters only on, until the best ones' neighbours all are."""
+    tried = {_key(plain): plain}
+    left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
+    best = plain
+    while True:
+        breadth = 1 if best.rms <= AT_NOISE * noise else BREADTH
+        parents = [f for f in _first(tried.values(), breadth) if _key(f) not in left]
+        if not parents:
+            return tried
+        for parent in parents:
+            progress(f"beside: {parent.name}")
+            left.add(_key(parent))
+            found = _neighbours(sheet, record, noise, parent, tried)
+            tried |= {_key(f): f for f in found}
+        best = _first(tried.values(), 1)[0]
 
 
 def _settle_below(

@@ -1,6 +1,7 @@
 """A recording as the diagnosis uses it: all sensors on one time grid, the command held between."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -180,13 +181,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     for signal in sensors.values():
         check_sampling(name, signal)
     check_shared(name, list(sensors.values()))
-    begin = max(signal.time[0] for signal in sensors.values())
-    end = min(signal.time[-1] for signal in sensors.values())
-    if end - begin < SHORTEST:
-        raise InputError(
-            f"{name}: {max(end - begin, 0.0):.1f} s that all signals share;"
-            f" record at least {SHORTEST:.0f} s"
-        )
+    begin, end = _shared_span(name, list(sensors.values()))
     check_command(name, recording[COMMAND], begin, end, machine)
     first = next(iter(sensors.values()))
     every = max(1, round(float(np.median(np.diff(first.time))) / COMMAND_STEP))
@@ -212,13 +207,29 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     check_direction(name, angle, np.append(commands, 0.0)[::every], machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
-    apart = float(np.sqrt(np.mean((shown[STROKE] - _strokes(angle, machine)) ** 2)))
-    measured_stroke = machine.sensors.own_stroke == 1 or apart > OWN_STROKE * noise(machine)[0]
-    own_stroke = {ANGLE, STROKE} <= measured and measured_stroke
+    own_stroke = {ANGLE, STROKE} <= measured and _has_own_sensor(shown[STROKE], angle, machine)
     least_steady = Stamps(*np.max([stamps(signal) for signal in sensors.values()], axis=0))
     return Experiment(
         name, period, commands, angle, outputs, rest, measured, own_stroke, least_steady
     )
+
+
+def _shared_span(name: str, signals: Sequence[Signal]) -> tuple[np.float64, np.float64]:
+    """Return from when to when, s, there are all signals. Raises InputError if that is short."""
+    begin = max(signal.time[0] for signal in signals)
+    end = min(signal.time[-1] for signal in signals)
+    if end - begin < SHORTEST:
+        raise InputError(
+            f"{name}: {max(end - begin, 0.0):.1f} s that all signals share;"
+            f" record at least {SHORTEST:.0f} s"
+        )
+    return begin, end
+
+
+def _has_own_sensor(stroke: Array, angle: Array, machine: Machine) -> bool:
+    """Tell whether a stroke, (n,) m, is not just the measured angle, (n,) rad, converted."""
+    apart = float(np.sqrt(np.mean((stroke - _strokes(angle, machine)) ** 2)))
+    return machine.sensors.own_stroke == 1 or bool(apart > OWN_STROKE * noise(machine)[0])
 
 
 def _angles(stroke: Array, machine: Machine) -> Array:

@@ -86,8 +86,7 @@ def fit(
 
     first: Array = held.residuals(start[None])[0]
     if not np.all(np.isfinite(first)):
-        untold = np.full((start.size, start.size), np.inf)
-        return Solution(start, untold, math.inf, np.zeros_like(untold))
+        return _impossible(start)
 
     def residuals(change: Array) -> Array:
         if not np.any(change):
@@ -134,8 +133,7 @@ def descended(problem: Problem, accuracy: float) -> Solution:
     residuals, slopes, taken = held.first_slopes(x)
     cost = float(np.mean(np.square(residuals)))
     if not math.isfinite(cost):
-        unknown = np.full((x.size, x.size), np.inf)
-        return Solution(x, unknown, math.inf, np.zeros_like(unknown))
+        return _impossible(x)
     sound = taken
     for _ in range(DESCENTS):
         neighbours = np.empty((0, x.size))
@@ -157,6 +155,12 @@ def descended(problem: Problem, accuracy: float) -> Solution:
             break
         sound, taken = gained > max(least, KEPT * promised), False
     return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost), slopes.T @ slopes)
+
+
+def _impossible(start: Array) -> Solution:
+    """Return a start, (k,), that cannot be simulated, of which nothing is told."""
+    untold = np.full((start.size, start.size), np.inf)
+    return Solution(start, untold, math.inf, np.zeros_like(untold))
 
 
 def steps_inside(x: Array, step: float, high: Array) -> Array:

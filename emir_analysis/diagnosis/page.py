@@ -143,22 +143,27 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
         blocks.append(
             Picture(figure, f"What parameters alone leave in the balance {name}, and against what.")
         )
+    return [*blocks, *_what_is_left(findings, result)]
+
+
+def _what_is_left(findings: Findings, result: Diagnosis) -> list[Block]:
+    """Return what no effect explains: as a curve, else as what swings, else over a signal."""
     shape = result.shape
     if result.curve is not None:
-        blocks += _curve(result.curve)
-    elif result.swing is not None:
-        blocks += _swing(result.swing, findings, result)
-    elif shape is not None and findings.speaking is not None and shape.share > TOLD:
-        what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
-        blocks.append(
-            Table(
-                (_over(shape), "lowering", "lifting"),
-                shape.table,
-                f"What is left in the balance {what}, against the signal that predicts it best "
-                f"({100 * shape.share:.0f} % of the variance in parts left out).",
-            )
+        return _curve(result.curve)
+    if result.swing is not None:
+        return _swing(result.swing, findings, result)
+    if shape is None or findings.speaking is None or not shape.share > TOLD:
+        return []
+    what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
+    return [
+        Table(
+            (_over(shape), "lowering", "lifting"),
+            shape.table,
+            f"What is left in the balance {what}, against the signal that predicts it best "
+            f"({100 * shape.share:.0f} % of the variance in parts left out).",
         )
-    return blocks
+    ]
 
 
 def _over(function: Shape | Swing) -> str:

@@ -128,14 +128,7 @@ def write_signals(
     with Rosbag2Writer(out) as writer:
         writer.add_metadata(METADATA, about)
         for topic, signals in members.items():
-            kind = kinds[topic]
-            schema = Schema(0, DEFINITIONS[kind].encode(), "ros2msg", kind)
-            fields = {
-                n: {"path": s.field, "unit": s.unit, "meaning": about.get(n, "")}
-                for n, s in signals.items()
-            }
-            metadata = channel_metadata(_SYSTEM_DEFAULT, HASHES[kind])
-            writer.add_topic(topic, schema, metadata | {FIELDS: json.dumps(fields)})
+            _add_topic(writer, topic, kinds[topic], signals, about)
         for k, stamp in enumerate(stamps.tolist()):
             for topic, signals in members.items():
                 now = {signals[name].field: float(values[name][k]) for name in signals}
@@ -145,6 +138,19 @@ def write_signals(
                 message = _message(kinds[topic], stamp, list(signals), now)
                 writer.write(topic, encoders[kinds[topic]](message), stamp, stamp)
     return left_out
+
+
+def _add_topic(
+    writer: Rosbag2Writer, topic: str, kind: str, signals: dict[str, Source], about: dict[str, str]
+) -> None:
+    """Announce a topic of a message type, with the signals in its fields."""
+    schema = Schema(0, DEFINITIONS[kind].encode(), "ros2msg", kind)
+    fields = {
+        n: {"path": s.field, "unit": s.unit, "meaning": about.get(n, "")}
+        for n, s in signals.items()
+    }
+    metadata = channel_metadata(_SYSTEM_DEFAULT, HASHES[kind])
+    writer.add_topic(topic, schema, metadata | {FIELDS: json.dumps(fields)})
 
 
 @dataclass(frozen=True)

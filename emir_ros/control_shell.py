@@ -79,13 +79,7 @@ class ControlNode(Shell):
         self._own = name.removesuffix("_node")
         self._inputs: dict[str, Topic] = {}
         self._fast_inputs = 0  # how many of them come every plant period
-        about = "an older input is stale [s], real time"
-        timeout: float = declare(self, "input_timeout", self.timeout, about)
-        if not 0.0 < timeout <= LONGEST_TIMEOUT:
-            raise ParameterError(
-                f"{name}: input_timeout = {timeout:g}: outside 0 ... {LONGEST_TIMEOUT:g} s"
-            )
-        self._timeout = Duration(seconds=timeout)
+        self._timeout = self._input_timeout(name)
         self._latest: dict[str, tuple[Time, Signals]] = {}
         self._pending: dict[int, dict[str, Signals]] = {}
         for topic in inputs:
@@ -103,6 +97,15 @@ class ControlNode(Shell):
             self._shown: Signals = {}
             self.diagnostics.figures = self._figures
             self.start_timer(self._period * 1e-9, self._on_timer)
+
+    def _input_timeout(self, name: str) -> Duration:
+        about = "an older input is stale [s], real time"
+        timeout: float = declare(self, "input_timeout", self.timeout, about)
+        if not 0.0 < timeout <= LONGEST_TIMEOUT:
+            raise ParameterError(
+                f"{name}: input_timeout = {timeout:g}: outside 0 ... {LONGEST_TIMEOUT:g} s"
+            )
+        return Duration(seconds=timeout)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Publish last what is published without inputs: the force loop shuts the valve."""

@@ -24,7 +24,7 @@ from emir_control.least_bending import NoMotionError
 
 Array = NDArray[np.float64]
 
-PARTS = 4  # of a period, at whose ends the deflection counts: 8 ms resolve the fastest mode, 63 Hz
+SUBSTEPS = 4  # of a period, at whose ends the deflection counts: 8 ms resolve 63 Hz, the fastest
 PLANNED_MODES = 2  # that have to rest at the end; the others swing by little
 BENDING, CHANGE = 1e-2, 4e-3  # m, m/s: what counts as one where a motion under way is taken over
 
@@ -114,8 +114,8 @@ def onward(boom: Boom, drive: Drive, task: HeldTask, begin: Begin) -> HeldMotion
     for k in range(len(free) - 1):
         free[k + 1] = held @ free[k]
     free = free[:, :-1]
-    bending = _shifted(kernel[:, :n] @ clamped.deflection, count) / (BENDING * np.sqrt(PARTS))
-    bent = free[:, :n] @ clamped.deflection / (BENDING * np.sqrt(PARTS))
+    bending = _shifted(kernel[:, :n] @ clamped.deflection, count) / (BENDING * np.sqrt(SUBSTEPS))
+    bent = free[:, :n] @ clamped.deflection / (BENDING * np.sqrt(SUBSTEPS))
     change = np.diff(np.eye(count), axis=0, append=0.0) / CHANGE
     turn, rest = _ends(kernel, n)
     turn_free, rest_free = _ends_of(free[-1], n)
@@ -147,7 +147,7 @@ def _motion(
 
 def _ends(kernel: Array, n: int) -> tuple[Array, Array]:
     """Return what each period's velocity makes of the end: turn, (count,), rest, (k, count)."""
-    return _ends_of(kernel[PARTS::PARTS][::-1].T, n)
+    return _ends_of(kernel[SUBSTEPS::SUBSTEPS][::-1].T, n)
 
 
 def _ends_of(states: Array, n: int) -> tuple[Array, Array]:
@@ -173,14 +173,14 @@ def _held(boom: Boom, drive: Drive, period: float) -> Array:
     model[rate, :-1] = joint
     model[pushed, rate] = -(drive.arm + drive.slope / drive.stiffness)
     model[pushed, -1] = 1.0
-    return np.asarray(expm(period / PARTS * model))
+    return np.asarray(expm(period / SUBSTEPS * model))
 
 
 def _kernel(held: Array, count: int) -> Array:
     """Return (z, z', alpha, alpha', s) after each part of u = 1 m/s in the first period."""
-    states = np.zeros((count * PARTS + 1, len(held)))
+    states = np.zeros((count * SUBSTEPS + 1, len(held)))
     for k in range(len(states) - 1):
-        states[k, -1] = float(k < PARTS)
+        states[k, -1] = float(k < SUBSTEPS)
         states[k + 1] = held @ states[k]
     return states[:, :-1]
 
@@ -189,7 +189,7 @@ def _shifted(kernel: Array, count: int) -> Array:
     """Return the answers to u = 1 m/s in each period, (n, count), of that to the first, (n,)."""
     answers = np.zeros((len(kernel), count))
     for k in range(count):
-        answers[k * PARTS :, k] = kernel[: len(kernel) - k * PARTS]
+        answers[k * SUBSTEPS :, k] = kernel[: len(kernel) - k * SUBSTEPS]
     return answers
 
 

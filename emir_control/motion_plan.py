@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
 from emir_control.drive_plan import (
-    PARTS,
+    SUBSTEPS,
     Begin,
     Drive,
     HeldMotion,
@@ -183,7 +183,7 @@ class Planner:
         return MotionPlan(
             stiffness=middle.stiffness,
             begins=begins,
-            step=self.period / PARTS,
+            step=self.period / SUBSTEPS,
             angle=angle,
             stroke=np.array([piston_stroke(each, linkage) for each in angle]),
             bending=shape @ (boom.tip_angle - boom.joint),

@@ -23,7 +23,7 @@ from emir_control.prefilter import joint_angle, piston_velocity
 
 Array = NDArray[np.float64]
 
-SLOPE_STEP = 1e-5  # rad
+ANGLE_STEP = 1e-5  # rad
 FLOOR = 1e-18  # of the process noise: what keeps the Riccati equation well posed
 
 
@@ -202,11 +202,11 @@ def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Arr
     linkage = drive.parameters.static
     angle = joint_angle(stroke, linkage)
     arm = piston_velocity(1.0, angle, linkage)
-    ahead, behind = (piston_velocity(1.0, angle + d, linkage) for d in (SLOPE_STEP, -SLOPE_STEP))
+    ahead, behind = (piston_velocity(1.0, angle + d, linkage) for d in (ANGLE_STEP, -ANGLE_STEP))
     force = boom.holding_torque * math.cos(angle) / arm
     stiffness = drive.stiffness(stroke)
     joint, n = boom.joint[:m], 2 * m + 4
-    follower = joint * force * (ahead - behind) / (2.0 * SLOPE_STEP)
+    follower = joint * force * (ahead - behind) / (2.0 * ANGLE_STEP)
     follower = follower + boom.weight[:m] * math.sin(angle)
     model = np.zeros((n, n + 1))
     model[:m, m : 2 * m] = np.eye(m)

@@ -22,7 +22,7 @@ from scipy.optimize import minimize_scalar
 
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
-from emir_control.drive_plan import PARTS
+from emir_control.drive_plan import SUBSTEPS
 from emir_control.least_bending import Task, limit
 from emir_control.lqg import Lqg, LqgParameters
 from emir_control.motion_plan import MotionPlan, holding
@@ -96,14 +96,14 @@ def _largest(law: Lqg, case: Case, stiffnesses: Sequence[float]) -> list[float]:
         real = regulator(boom, drive, middle, p.period, machine)
         pushed = _pushed(boom, drive, plan) / drive.stiffness(middle)
         off = _off_the_plan(known, real, stiffer, (stiffer - 1.0) * np.diff(pushed) / p.period)
-        bending.append(float(abs(plan.deflection[PARTS::PARTS] + off).max()))
+        bending.append(float(abs(plan.deflection[SUBSTEPS::SUBSTEPS] + off).max()))
     return bending
 
 
 def _pushed(boom: Boom, drive: Actuator, plan: MotionPlan) -> Array:
     """Return the plan's force off that at rest, N, at the ends of the control periods."""
-    resting = [holding(boom, drive, float(angle)) for angle in plan.angle[::PARTS]]
-    return np.asarray(plan.force[::PARTS] - resting)
+    resting = [holding(boom, drive, float(angle)) for angle in plan.angle[::SUBSTEPS]]
+    return np.asarray(plan.force[::SUBSTEPS] - resting)
 
 
 def _off_the_plan(known: Regulator, real: Regulator, stiffer: float, lacking: Array) -> Array:

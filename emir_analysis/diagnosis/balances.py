@@ -69,8 +69,8 @@ EMPTY = 5.0  # times its noise: a lower pressure does not tell whether the chamb
 QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
-STEP = 0.25  # s, from one window to the next
-DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
+WINDOW_STEP = 0.25  # s, from one window to the next
+NOISE_DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
 
 
 class Balances:
@@ -301,7 +301,7 @@ class _Window:
         self._size = round(length / period)
         self._first = (round(longest / period) - self._size) // 2
         self._span = round(longest / period)
-        self._every = max(1, round(STEP / period))
+        self._every = max(1, round(WINDOW_STEP / period))
         powers = np.vander(np.arange(self._size) * period, degree + 1, increasing=True)
         factorial = (1.0, 1.0, 2.0)[degree]
         self._weights = np.linalg.pinv(powers)[degree] * factorial
@@ -331,7 +331,7 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
     """
     angle, pressure = experiment.start()
     pressure = machine.supply.pT if np.isnan(pressure) else pressure
-    draws = max(1, round(DRAWN / float(experiment.time[-1])))
+    draws = max(1, round(NOISE_DRAWN / float(experiment.time[-1])))
     step = machine.sensors.resolver_step
     inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
     ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])

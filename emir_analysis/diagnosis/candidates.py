@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import STEP, Problem, Solution, fit
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, Solution, fit
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
@@ -26,16 +26,16 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SCREENING_ACCURACY = 1e-3  # relative; the free run continues from there
-ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
+FREE_RUN_ACCURACY = 1e-3  # relative, of the free run's squared error: 0.05 % of the error
 FINE_ACCURACY = 1e-5  # the same of the last fit: flat directions still matter on another recording
-ROUGH = 3e-2  # the same where only the way to the optimum is wanted
+BEGINNING_ACCURACY = 3e-2  # the same where only the way to the optimum is wanted
 POLISHED = 2.0  # RMS error in units of the noise beyond which flat directions do not matter yet
 HOPELESS = 5.0  # RMS error in units of the noise beyond which a model is not near the truth
 HOPELESS_ACCURACY = 0.1  # relative
 BEHIND = 1.5  # times the error of what a trial has to beat: further off, a fine fit changes nothing
 GLIMPSE = 8  # evaluations of a fit that may lead nowhere
 GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted before the whole
-SLOPE_STEP = 3e-2  # as fit.STEP, of the free run: what sticks and slips is no smooth function
+FREE_RUN_STEP = 3e-2  # as fit.DIFFERENCE_STEP, of a free run: sticking makes it rough
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 SETTLING = 5.0  # s from the start in which the state at rest is found
@@ -177,9 +177,9 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     x = np.append(shaped(start, evidence).x, np.zeros(2 * len(evidence.experiments)))
     begins = [x]
     for share in GROWING:
-        begun = fit(free_run_problem(start, evidence, begins[-1], share), ROUGH)
+        begun = fit(free_run_problem(start, evidence, begins[-1], share), BEGINNING_ACCURACY)
         begins.append(begun.x)
-    accuracy = ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
+    accuracy = FREE_RUN_ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
     # what acts late is not told by the beginning, and may have been led astray there
     whole = free_run_problem(start, evidence, x)
     cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)
@@ -248,17 +248,19 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     ones point a little beside it. A hopeless trial is not polished, nor one far behind its rival.
     """
     problem = _whole_problem(known, evidence)
-    near = fit(problem, ACCURACY)
+    near = fit(problem, FREE_RUN_ACCURACY)
     behind = math.inf if rival is None else BEHIND * math.sqrt(mean_square(rival, evidence))
     if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
-    fine = replace(problem, start=near.x, coarse=None, step=STEP)
-    return known.continued(fit(fine, FINE_ACCURACY if near.misfit <= POLISHED else ACCURACY))
+    fine = replace(problem, start=near.x, coarse=None, step=DIFFERENCE_STEP)
+    accuracy = FINE_ACCURACY if near.misfit <= POLISHED else FREE_RUN_ACCURACY
+    return known.continued(fit(fine, accuracy))
 
 
 def glimpsed(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the free run of the whole for so long as tells whether that leads anywhere."""
-    return known.continued(fit(_whole_problem(known, evidence), ACCURACY, evaluations=GLIMPSE))
+    problem = _whole_problem(known, evidence)
+    return known.continued(fit(problem, FREE_RUN_ACCURACY, evaluations=GLIMPSE))
 
 
 def _whole_problem(known: Trial, evidence: Evidence) -> Problem:
@@ -317,7 +319,7 @@ def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 
         np.append(high, np.ones(states)),
         np.append(start.unknowns.toleranced, np.zeros(states, dtype=bool)),
         partial(model, coarse=True),
-        SLOPE_STEP,
+        FREE_RUN_STEP,
     )
 
 
@@ -391,7 +393,7 @@ def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arr
     if not np.isfinite(np.min(cost)):
         return best
     none = np.zeros(2, dtype=bool)
-    return fit(Problem(model, best, -np.ones(2), np.ones(2), none), ACCURACY).x
+    return fit(Problem(model, best, -np.ones(2), np.ones(2), none), FREE_RUN_ACCURACY).x
 
 
 def _free_run_errors(

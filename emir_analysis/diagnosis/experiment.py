@@ -45,7 +45,7 @@ SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and le
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
 REST = 0.2  # s at the start from which the initial pressure is averaged
 SHORTEST_REST = 0.1  # s
-ALIKE = 0.85  # of two names, in which they are probably the same (difflib)
+NAME_CUTOFF = 0.85  # of two names, in which they are probably the same (difflib)
 OWN_STROKE = 2.0  # times the resolver's error, by which a stroke that it does not show differs
 
 
@@ -167,7 +167,7 @@ def check_signal_map(signal_map: SignalMap) -> None:
     if not {ANGLE, STROKE} & set(signal_map):
         raise InputError(f"the signal map has neither {ANGLE} nor {STROKE}; one is needed")
     for name in signal_map:
-        near = get_close_matches(name, SIGNALS, n=1, cutoff=ALIKE)
+        near = get_close_matches(name, SIGNALS, n=1, cutoff=NAME_CUTOFF)
         if name not in SIGNALS and near and near[0] not in signal_map:
             raise InputError(f"the signal map has {name}; is {near[0]} meant?")
     for name, unit in SIGNALS.items():

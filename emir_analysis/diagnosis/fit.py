@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from emir_analysis.signals import Array
 
-STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
+DIFFERENCE_STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
 LEAST_STEP = 1e-5  # relative, of the change: not met because steps that lead nowhere were cut
@@ -19,8 +19,8 @@ DAMPINGS = np.geomspace(1.0, 1e-8, 5)  # of its steps, in units of the largest c
 REACH = 10.0  # standard deviations of a principal axis, over which a descent takes slopes ...
 LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
 FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
-BEYOND = 1e12  # times the noise: a run that is further off is out of all bounds
-TOLD = 1.0 + 1e-6  # times the curvature of what holds a parameter: more and the data tell of it
+OUT_OF_BOUNDS = 1e12  # times the noise: a run that is further off is out of all bounds
+TOLD_CURVATURE = 1.0 + 1e-6  # times the curvature of what holds a parameter: more, and data tell
 KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
 EVALUATIONS = 20  # of the model in one fit, beside those for the slopes
 
@@ -43,7 +43,7 @@ class Problem:
     high: Array
     stated: NDArray[np.bool_]
     coarse: Callable[[Array], Array] | None = None
-    step: float = STEP
+    step: float = DIFFERENCE_STEP
     curvature: Array | None = None
 
 
@@ -180,7 +180,7 @@ def _bounded(model: Callable[[Array], Array]) -> Callable[[Array], Array]:
 
     def bounded(points: Array) -> Array:
         values = model(points)
-        return np.where(np.abs(values) < BEYOND, values, np.nan)
+        return np.where(np.abs(values) < OUT_OF_BOUNDS, values, np.nan)
 
     return bounded
 
@@ -249,7 +249,7 @@ class _Held:
         moved = points[near] - x
         unforeseen = values[near] - residuals - moved @ former.T
         change = np.linalg.lstsq(moved, unforeseen, rcond=1e-9)[0].T
-        told = np.diag(curvature) > TOLD * self._weight**2
+        told = np.diag(curvature) > TOLD_CURVATURE * self._weight**2
         slopes = former + np.where(told, change, 0.0)
         return points[[int(np.argmin(costs))]], slopes, bool(np.all(near))
 

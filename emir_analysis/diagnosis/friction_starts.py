@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, steps_inside
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, TOLERANCE_SPREAD, steps_inside
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.signals import Array
 
@@ -74,7 +74,7 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
 def _acting(start: Trial, others: list[int], missing: Callable[[Array], Array]) -> Array:
     """Return how those unknowns act on what is missing, (o, n): found once for all friction."""
     _, high = start.unknowns.bounds
-    steps = steps_inside(start.x, STEP, high)
+    steps = steps_inside(start.x, DIFFERENCE_STEP, high)
     values = missing(np.vstack([start.x, start.x + np.diag(steps)[others]]))
     return np.asarray((values[1:] - values[0]) / steps[others, None])
 

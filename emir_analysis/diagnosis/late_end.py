@@ -7,7 +7,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.screening import LOAD
 
 DURATION = f"effects.{LOAD}.duration"
-STEP = 0.5  # s, between the ends that are tried
+END_STEP = 0.5  # s, between the ends that are tried
 
 
 def with_a_late_end(loaded: Trial, evidence: Evidence, seen: float) -> Trial:
@@ -21,7 +21,7 @@ def with_a_late_end(loaded: Trial, evidence: Evidence, seen: float) -> Trial:
         return loaded
     k, length = paths.index(DURATION), float(evidence.experiments[0].time[-1])
     load = loaded.machine.effects.external_load
-    lasting = np.arange(seen * length, length, STEP) - load.start
+    lasting = np.arange(seen * length, length, END_STEP) - load.start
     lasting = lasting[(lasting > 0.0) & (lasting < load.duration)]
     if not lasting.size:
         return loaded

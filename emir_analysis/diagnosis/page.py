@@ -24,8 +24,8 @@ from emir_analysis.diagnosis.result import (
     SignalResult,
 )
 from emir_analysis.diagnosis.select import quiet
-from emir_analysis.diagnosis.shape import TOLD, Shape
-from emir_analysis.diagnosis.statement import PARTS
+from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
+from emir_analysis.diagnosis.statement import CURVE_PARTS
 from emir_analysis.diagnosis.summary import cautions, in_short, told_balances
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
@@ -153,7 +153,7 @@ def _what_is_left(findings: Findings, result: Diagnosis) -> list[Block]:
         return _curve(result.curve)
     if result.swing is not None:
         return _swing(result.swing, findings, result)
-    if shape is None or findings.speaking is None or not shape.share > TOLD:
+    if shape is None or findings.speaking is None or not shape.share > PREDICTED_SHARE:
         return []
     what = f"{findings.speaking}, {result.balances[findings.speaking].unit}"
     return [
@@ -194,7 +194,7 @@ def _swing(swing: Swing, findings: Findings, result: Diagnosis) -> list[Block]:
 def _curve(curve: Curve) -> list[Block]:
     """Return a picture of what has no name, and a table of every second of its points."""
     rows = list(zip(curve.signal, *curve.parts.values(), strict=True))[::2]
-    heads = [f"{PARTS[name]}, {curve.part_unit}" for name in curve.parts]
+    heads = [f"{CURVE_PARTS[name]}, {curve.part_unit}" for name in curve.parts]
     return [
         Picture(
             curve_picture(curve),

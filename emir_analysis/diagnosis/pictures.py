@@ -9,7 +9,7 @@ from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
-from emir_analysis.diagnosis.statement import PARTS
+from emir_analysis.diagnosis.statement import CURVE_PARTS
 from emir_analysis.diagnosis.swing import Swing, by_swing
 from emir_analysis.report import new_figure
 
@@ -157,7 +157,7 @@ def curve_picture(curve: Curve) -> Figure:
     ax = figure.subplots()
     for (name, points), colour in zip(curve.parts.items(), (LIFTING, LOWERING), strict=False):
         at, size = scale * np.array(curve.signal), factor * np.array(points)
-        ax.plot(at, size, ".-", ms=4, lw=1.0, color=colour, label=PARTS[name])
+        ax.plot(at, size, ".-", ms=4, lw=1.0, color=colour, label=CURVE_PARTS[name])
     ax.set_xlabel(text)
     ax.set_ylabel(label)
     ax.legend(fontsize=8, loc="best")

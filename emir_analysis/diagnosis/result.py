@@ -21,7 +21,7 @@ from emir_analysis.diagnosis.free_run import block_medians, rms
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
-from emir_analysis.diagnosis.statistics import BLOCK, PERIODS
+from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK, PERIODS
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import between_steps, open_shares, untold
 from emir_analysis.diagnosis.where import Where
@@ -36,7 +36,7 @@ from emir_plant.unnamed import UNNAMED
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-WIDTH = 2.0  # standard deviations on either side of a parameter's low and high
+INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
 FEWEST_DIGITS = 3
 OPEN = "not determined by the recording"
 SET = "set: as good as fitted"
@@ -221,7 +221,7 @@ def _parameters(trial: Trial, evidence: Evidence) -> dict[str, ParameterResult]:
     together = {path: _without_points(others) for path, others in together.items()}
     result = {}
     for k, (unknown, x) in enumerate(zip(members, trial.x, strict=True)):
-        low, high = unknown.deviation(float(x), WIDTH * float(spread[k]))
+        low, high = unknown.deviation(float(x), INTERVAL * float(spread[k]))
         value = unknown.value(float(x))
         with_it = together[unknown.path]
         if unknown.is_stepwise and not np.isfinite(spread[k]):
@@ -325,7 +325,7 @@ def _slow_period(findings: Findings) -> float:
     try:
         rest = plant.initial(angle)
     except SimulationError:
-        return BLOCK / PERIODS
+        return BOOTSTRAP_BLOCK / PERIODS
     return float(1.0 / linearize(plant, rest).modes()[0][0])
 
 

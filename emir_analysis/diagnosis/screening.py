@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import (
-    SLOPE_STEP,
+    FREE_RUN_STEP,
     Trial,
     coarse_errors,
     moved,
@@ -24,15 +24,22 @@ from emir_analysis.diagnosis.candidates import (
     trial,
 )
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import HELD, STEP, TOLERANCE_SPREAD, Problem, fit, steps_inside
+from emir_analysis.diagnosis.fit import (
+    DIFFERENCE_STEP,
+    HELD,
+    TOLERANCE_SPREAD,
+    Problem,
+    fit,
+    steps_inside,
+)
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
-ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
-STARTS = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
+OWN_FIELDS_ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
+SIZES_TRIED = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
 # the same of a size that acts only beyond some value
 STEPS = tuple(float(s) for s in range(-24, 25) if s)
 FINER = tuple(s / 5.0 for s in range(-4, 5))  # steps about the best of these
@@ -40,7 +47,7 @@ SMALL = 0.1  # trial sizes, at which a machine is near enough to the known one
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
-SAME = 6  # decimals of the cost, to which what leaves the same is told from rounding
+COST_DECIMALS = 6  # decimals of the cost, to which what leaves the same is told from rounding
 LOAD = "external_load"
 AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
@@ -176,7 +183,7 @@ class _Candidate:
             return []
         nothing_held = np.zeros(self.x.size, dtype=bool)
         problem = Problem(self._inside, self.x, *self.bounds, nothing_held)
-        return [fit(replace(problem, start=x), ACCURACY, robust=True).x for x in begins]
+        return [fit(replace(problem, start=x), OWN_FIELDS_ACCURACY, robust=True).x for x in begins]
 
     def _screened(self, points: list[Array]) -> Screened:
         """Return the trial at the best of some fields, (k,), with its parameters at their best."""
@@ -188,7 +195,7 @@ class _Candidate:
 
         The direction of a load counts for nothing where all of it is on the piston.
         """
-        costs = np.round([_soft(row) for row in self._inside(np.array(points))], SAME)
+        costs = np.round([_soft(row) for row in self._inside(np.array(points))], COST_DECIMALS)
         first = np.unique(costs, return_index=True)[1]
         return [points[k] for k in sorted(first)]
 
@@ -242,7 +249,7 @@ class OnBalances:
 
     def __init__(self, known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> None:
         self._known, self._sheet = known, sheet
-        self._left = _Left(known, _in_balances(evidence, floor), STEP)
+        self._left = _Left(known, _in_balances(evidence, floor), DIFFERENCE_STEP)
         self._begun = _begun(known, sheet, _by_balance(known, evidence), self._left)
 
     def singles(self) -> list[Screened]:
@@ -284,7 +291,7 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     def missing(trials: list[Trial]) -> Array:
         return coarse_errors([t.machine for t in trials], evidence, rest)
 
-    left = _Left(known, missing, SLOPE_STEP)
+    left = _Left(known, missing, FREE_RUN_STEP)
     told = evidence.told[FORCE]
     loads = _by_balance(known, evidence) if told else _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
@@ -373,7 +380,7 @@ def _starts(
         return [x, *(_fields(members, load, at) for load in loads for at in (AT_TIP, ON_PISTON))]
     sizes = np.array([not unknown.shapes for unknown in members])
     negative = any(u.low < 0.0 for u, size in zip(members, sizes, strict=True) if size)
-    allowed = [s for s in STARTS if s > 0.0 or negative]
+    allowed = [s for s in SIZES_TRIED if s > 0.0 or negative]
     switched_on = np.vstack([sizes, np.eye(x.size)[sizes]]) if np.sum(sizes) > 1 else sizes[None]
     starts = [np.where(sizes, s * size * x * on, x) for on in switched_on for s in allowed]
     for stepwise in REGISTRY[effect].stepwise:

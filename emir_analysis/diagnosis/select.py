@@ -17,7 +17,7 @@ LEFT = 1.03  # times the sensor noise, all signals together: more, and a fit is 
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
 FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balance varies by chance
-BLOCK = 1.0  # s: errors closer than this are not counted as independent
+CORRELATION_TIME = 1.0  # s: errors closer than this are not counted as independent
 
 
 def score(mean_squares: Array, independent: float, unknowns: float) -> float:
@@ -40,7 +40,8 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     missing = (evidence.residuals([trial.machine])[0] / floor)[:, evidence.fitted]
     if not np.all(np.isfinite(missing)):
         return float("inf")
-    independent = (evidence.duration(1.0) - len(evidence.experiments) * FORCE_WINDOW) / BLOCK
+    covered = evidence.duration(1.0) - len(evidence.experiments) * FORCE_WINDOW
+    independent = covered / CORRELATION_TIME
     # as the fit counts them: far above the noise by their size, so that no window decides alone
     misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))
     return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
@@ -57,7 +58,7 @@ def free_run_score(trial: Trial, evidence: Evidence, seen: float = SEEN) -> floa
     if not np.all(np.isfinite(unseen)):
         return float("inf")
     channels = np.maximum(np.mean(unseen**2, axis=0), 1.0)
-    return score(channels, evidence.duration(1.0 - seen) / BLOCK, trial.x.size)
+    return score(channels, evidence.duration(1.0 - seen) / CORRELATION_TIME, trial.x.size)
 
 
 def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:

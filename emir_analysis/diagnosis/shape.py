@@ -9,9 +9,9 @@ from emir_analysis.signals import Array
 
 BINS = 15
 FEWEST = 3  # windows in a bin that count as a mean
-ALIKE = 0.02  # difference of two shares below which the simpler function is taken
-PARTS = 3  # of the recording; each is predicted from the others
-TOLD = 0.5  # share of the variance from which on a signal is said to predict a residual
+SAME_SHARE = 0.02  # difference of two shares below which the simpler function is taken
+FOLDS = 3  # of the recording; each is predicted from the others
+PREDICTED_SHARE = 0.5  # share of the variance from which on a signal is said to predict a residual
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def best_shape(residual: Array, velocity: Array, predictors: dict[str, tuple[str
             table = _table(residual, values, bins, velocity > 0.0)
             found.append(Shape(name, unit, by_direction, share, table))
     most = max(shape.share for shape in found)
-    return next(shape for shape in found if shape.share > most - ALIKE)
+    return next(shape for shape in found if shape.share > most - SAME_SHARE)
 
 
 def _bins(values: Array) -> NDArray[np.intp]:
@@ -59,9 +59,9 @@ def _bins(values: Array) -> NDArray[np.intp]:
 def _predicted_share(residual: Array, bins: NDArray[np.intp], up: NDArray[np.bool_]) -> float:
     """Return 1 - unexplained/total variance; each part is predicted from the others' means."""
     cell = bins + BINS * up
-    part = np.arange(residual.size) * PARTS // residual.size
+    part = np.arange(residual.size) * FOLDS // residual.size
     predicted = np.zeros_like(residual)
-    for k in range(PARTS):
+    for k in range(FOLDS):
         seen, unseen = part != k, part == k
         count = np.bincount(cell[seen], minlength=2 * BINS)
         total = np.bincount(cell[seen], residual[seen], minlength=2 * BINS)

@@ -17,10 +17,10 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
-from emir_analysis.diagnosis.shape import TOLD, Shape
+from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
-from emir_analysis.diagnosis.where import MOST, Where
+from emir_analysis.diagnosis.where import LOCATED, Where
 from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples
@@ -31,7 +31,7 @@ DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 SHORT = 0.3  # of the recordings: a stretch of time that is named
-PARTS = {  # of a curve, as they are called
+CURVE_PARTS = {  # of a curve, as they are called
     "along": "whatever the direction",
     "friction": "against the motion",
     "change": "of the opening as stated",
@@ -203,7 +203,7 @@ def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
     rejected = () if findings.rejected is None else findings.rejected.effects
     on = [name for name in rejected if getattr(effects, name).is_on]
     beside = f" beside {' and '.join(on)}" if on else ""
-    most = {PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
+    most = {CURVE_PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
     unit = "" if curve.part_unit == "1" else f" {curve.part_unit}"
     sizes = " and ".join(f"up to {size:.3g}{unit} {text}" for text, size in most.items())
     return (
@@ -228,8 +228,8 @@ def _when(lies: Where, findings: Findings) -> str:
         return ""
     (first, begin), (last, end) = map(findings.evidence.place, (lies.begin, lies.end))
     if len(findings.evidence.experiments) == 1:
-        return f" ({100 * MOST:.0f} % of it from {begin:.1f} to {end:.1f} s)"
-    return f" ({100 * MOST:.0f} % of it from {begin:.1f} s of {first} to {end:.1f} s of {last})"
+        return f" ({100 * LOCATED:.0f} % of it from {begin:.1f} to {end:.1f} s)"
+    return f" ({100 * LOCATED:.0f} % of it from {begin:.1f} s of {first} to {end:.1f} s of {last})"
 
 
 def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
@@ -237,7 +237,7 @@ def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
         what = f"a function of {swing.predictor}" if swing.predictor else "something"
         period, share = f"{swing.period:.3g} s", f"{100 * swing.share:.0f} %"
         return f"{what} that swings with a period of {period} predicts {share} of it"
-    if shape.share < TOLD and lies.level is not None:
+    if shape.share < PREDICTED_SHARE and lies.level is not None:
         unit = "" if lies.unit == "1" else f" {lies.unit}"
         return f"nearly all of it lies where {lies.signal} is {lies.side} {lies.level:.3g}{unit}"
     if _is_untold(shape, swing, lies):
@@ -248,7 +248,7 @@ def _described(shape: Shape, swing: Swing | None, lies: Where) -> str:
 
 def _is_untold(shape: Shape, swing: Swing | None, lies: Where) -> bool:
     """Tell whether neither a signal nor time says anything of what is left."""
-    return swing is None and lies.level is None and shape.share < TOLD
+    return swing is None and lies.level is None and shape.share < PREDICTED_SHARE
 
 
 def at_end(findings: Findings) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from emir_analysis.signals import Array
 
-BLOCK = (
+BOOTSTRAP_BLOCK = (
     5.0  # s of a bootstrap's blocks: some periods of the slow mode, so that they are independent
 )
 DRAWS = 1000
@@ -27,7 +27,7 @@ class Interval:
 
 
 def rms_intervals(
-    errors: Sequence[Array], periods: Sequence[float], block: float = BLOCK
+    errors: Sequence[Array], periods: Sequence[float], block: float = BOOTSTRAP_BLOCK
 ) -> list[Interval]:
     """Return the interval of each column's RMS by bootstrap of blocks, s.
 

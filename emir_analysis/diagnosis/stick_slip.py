@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import Trial, free_run_problem, shapes
+from emir_analysis.diagnosis.candidates import FREE_RUN_ACCURACY, Trial, free_run_problem, shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import (
@@ -25,7 +25,7 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
 )
 from emir_analysis.diagnosis.friction_starts import friction_starts
-from emir_analysis.diagnosis.select import AT_NOISE, BLOCK, LEFT, STRONG, score
+from emir_analysis.diagnosis.select import AT_NOISE, CORRELATION_TIME, LEFT, STRONG, score
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
@@ -33,7 +33,7 @@ FIRST = 3.0  # s, of the first beginning
 STARTS = 12  # from which the first beginning is fitted at a time ...
 TRIED = 24  # ... and in all, as long as none comes to the noise
 LED = (6, 3)  # of the best, along the next beginnings
-SAME = 1.001  # ratio of the errors of two fits up to which they are the same minimum
+SAME_MINIMUM = 1.001  # ratio of the errors of two fits up to which they are the same minimum
 GROWTH = 1.5  # of a beginning from one to the next while several fits are led
 GROWTHS = (3.0, 1.5, 1.2)  # then: the most over which the free run follows the machine
 NEAR_END = 1.1  # times a beginning
@@ -48,9 +48,8 @@ WIDER = 2.0  # times, every second time: over rough errors slopes promise too li
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 OFF = 1.5  # times the noise over that, from which on more is missing: right laws leave 0.98 at most
 WORSE = 1.1  # times what a rival leaves over a beginning: none that leaves more can replace it
-SLOPE_STEP = 3e-3  # as fit.STEP: over longer ones the piston sticks at other instants
-ACCURACY = 1e-3  # relative, of the free run's squared error
-ROUGH = 1e-2  # the same of a fit to go on from, or to tell only whether half of the rest is gone
+STICKING_STEP = 3e-3  # as fit.DIFFERENCE_STEP: over longer ones the piston sticks at other instants
+ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest is gone is asked
 
 Method = Callable[[Problem, float], Solution]
 
@@ -86,14 +85,14 @@ def _begun(start: Trial, evidence: Evidence, floor: Array) -> Solution:
     points = [_at_rest(each, evidence) for each in starts]
     fits: list[Solution] = []
     for k in range(0, TRIED, STARTS):
-        fits += [_fitted(start, first, x, ROUGH) for x in points[k : k + STARTS]]
+        fits += [_fitted(start, first, x, ROUGH_ACCURACY) for x in points[k : k + STARTS]]
         if min(each.misfit for each in fits) <= 1.0:
             break
     for count in LED:
         longer = GROWTH * time
         best = _distinct(fits)[:count]
         points = [_begin(start, evidence, each, time, longer) for each in best]
-        fits = [_fitted(start, evidence.until(longer), x, ROUGH) for x in points]
+        fits = [_fitted(start, evidence.until(longer), x, ROUGH_ACCURACY) for x in points]
         time = longer
     return _led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit)
 
@@ -102,7 +101,7 @@ def _distinct(fits: list[Solution]) -> list[Solution]:
     """Return the solutions, the best first, each minimum once."""
     found: list[Solution] = []
     for solution in sorted(fits, key=lambda each: each.misfit):
-        if not found or solution.misfit > SAME * found[-1].misfit:
+        if not found or solution.misfit > SAME_MINIMUM * found[-1].misfit:
             found.append(solution)
     return found
 
@@ -132,7 +131,7 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
 def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
     """Return the criterion of `select` for a fit whose state at rest was fitted along."""
     channels = np.full(np.count_nonzero(evidence.shown), misfit**2)
-    return score(channels, evidence.duration(1.0) / BLOCK, fitted.x.size)
+    return score(channels, evidence.duration(1.0) / CORRELATION_TIME, fitted.x.size)
 
 
 class Grown(NamedTuple):
@@ -165,7 +164,7 @@ def follows_the_beginning(known: Trial, evidence: Evidence) -> bool:
 
 def _further(known: Trial, evidence: Evidence) -> tuple[Trial, float]:
     """Fit a trial that is near the optimum; return it and its RMS error in units of the noise."""
-    fitted = _fitted(known, evidence, _at_rest(known, evidence), ROUGH)
+    fitted = _fitted(known, evidence, _at_rest(known, evidence), ROUGH_ACCURACY)
     return known.continued(fitted), fitted.misfit
 
 
@@ -190,14 +189,14 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     are the machine's (a particle filter's step, Gordon et al. 1993). Where even that leaves more
     than before, the law is off, not one stick, and less is spent on it from there on.
     """
-    fitted, holds = _fitted(known, evidence.until(time), x, ACCURACY, method), True
+    fitted, holds = _fitted(known, evidence.until(time), x, FREE_RUN_ACCURACY, method), True
     while time < end:
         holds = holds and fitted.misfit <= AT_NOISE
         growths = GROWTHS if holds else GROWTHS[:-1]
         longer = _followed(known, evidence, fitted, time, end, growths)
         if longer > time:
             part = evidence.until(longer)
-            accuracy = ACCURACY if longer == end else ROUGH
+            accuracy = FREE_RUN_ACCURACY if longer == end else ROUGH_ACCURACY
             fitted = _fitted(known, part, fitted.x, accuracy, method, fitted.curvature)
         else:
             longer = _longer(growths[-1] * time, end)
@@ -243,7 +242,7 @@ def _found_again(
         x = _drawn(known, evidence, fitted, DRAWN if draws > 1 else DRAWN_OF_EACH, draw)
         if found and np.array_equal(x, fitted.x):
             continue  # none of them is better than where it was
-        found.append(_fitted(known, evidence, x, ACCURACY, method, fitted.curvature))
+        found.append(_fitted(known, evidence, x, FREE_RUN_ACCURACY, method, fitted.curvature))
         if found[-1].misfit <= AS_BEFORE * fitted.misfit:
             break
     return min(found, key=lambda each: each.misfit)
@@ -291,5 +290,5 @@ def _fitted(  # noqa: PLR0913, PLR0917 (as _led)
     curvature: Array | None = None,
 ) -> Solution:
     problem = free_run_problem(known, evidence, x)
-    problem = replace(problem, coarse=None, step=SLOPE_STEP, curvature=curvature)
+    problem = replace(problem, coarse=None, step=STICKING_STEP, curvature=curvature)
     return method(problem, accuracy)

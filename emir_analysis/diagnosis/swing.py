@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.diagnosis.shape import ALIKE, PARTS, TOLD, Shape
+from emir_analysis.diagnosis.shape import FOLDS, PREDICTED_SHARE, SAME_SHARE, Shape
 from emir_analysis.signals import Array
 
 BINS = 5  # of a signal: each has three unknowns
@@ -52,7 +52,7 @@ def swing(
     """
     found = best_swing(residual, time, predictors)
     left = 1.0 - max(shape.share, 0.0)
-    told = found.share >= TOLD and 1.0 - found.share <= (1.0 - TAKEN) * left
+    told = found.share >= PREDICTED_SHARE and 1.0 - found.share <= (1.0 - TAKEN) * left
     return found if told and shape.share < STATIC else None
 
 
@@ -72,7 +72,7 @@ def best_swing(residual: Array, time: Array, predictors: dict[str, tuple[str, Ar
             found[name].append(_shares(residual, basis, _bins(values)))
     shares = {name: np.concatenate(parts) for name, parts in found.items()}
     most = max(float(share.max()) for share in shares.values())
-    name = next(name for name, share in shares.items() if share.max() > most - ALIKE)
+    name = next(name for name, share in shares.items() if share.max() > most - SAME_SHARE)
     at = int(np.argmax(shares[name]))
     unit, values = signals[name]
     bins = _bins(values)
@@ -114,9 +114,9 @@ def _fitted(residual: Array, basis: Array, bins: NDArray[np.intp]) -> Array:
 
 def _shares(residual: Array, basis: Array, bins: NDArray[np.intp]) -> Array:
     """Return 1 - unexplained/total variance, (f,), each part predicted from the others."""
-    part = np.arange(residual.size) * PARTS // residual.size
+    part = np.arange(residual.size) * FOLDS // residual.size
     missed = np.zeros(basis.shape[2])
-    for k in range(PARTS):
+    for k in range(FOLDS):
         seen, unseen = part != k, part == k
         sizes = _fitted(residual[seen], basis[:, seen], bins[seen])
         predicted = np.einsum("awf,wfa->wf", basis[:, unseen], sizes[bins[unseen]])

@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
 from emir_analysis.diagnosis.candidates import (
-    ACCURACY,
+    FREE_RUN_ACCURACY,
     GROWING,
     HOPELESS,
     Trial,
@@ -25,7 +25,13 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import STEP, TOLERANCE_SPREAD, Problem, fit, steps_inside
+from emir_analysis.diagnosis.fit import (
+    DIFFERENCE_STEP,
+    TOLERANCE_SPREAD,
+    Problem,
+    fit,
+    steps_inside,
+)
 from emir_analysis.diagnosis.select import (
     EXPLAINED,
     STRONG,
@@ -42,9 +48,9 @@ from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
 from emir_plant.unnamed import UNNAMED
 
-TOLD = 0.5  # share of the balances' squares above the noise from which on a curve is measured
+MEASURED_SHARE = 0.5  # of the balances' squares above the noise, from which on it is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
-MOST = 10.0  # times its size: a curve goes no further
+LARGEST_SIZE = 10.0  # times its size: a curve goes no further
 BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve over its size
 SMOOTHING = "smoothing_speed"
 FRICTION = "_friction"  # how all of it is called
@@ -80,7 +86,7 @@ class Curves:
         """
         balances = self._balances if beside is None else self._about(beside)
         best = balances.best(self._forms)
-        if best is None or best.share < TOLD:
+        if best is None or best.share < MEASURED_SHARE:
             return None
         found = _fitted(best.trial, self._evidence)
         return found if excess(found, self._evidence) <= beyond(EXPLAINED) else None
@@ -127,7 +133,7 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     near = excess(start, evidence) <= beyond(EXPLAINED)
     for share in (1.0,) if near else (*GROWING, 1.0):
         problem = free_run_problem(trial, evidence, x, share)
-        solution = fit(_smoothly(problem, trial, begin), ACCURACY)
+        solution = fit(_smoothly(problem, trial, begin), FREE_RUN_ACCURACY)
         x, trial = solution.x, trial.continued(solution)
         if solution.misfit > HOPELESS:
             break
@@ -179,7 +185,7 @@ class _Balances:
 
     def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
         self._known, self._evidence, self._floor = known, evidence, floor
-        steps = steps_inside(known.x, STEP, known.unknowns.bounds[1])
+        steps = steps_inside(known.x, DIFFERENCE_STEP, known.unknowns.bounds[1])
         moved = map(known.unknowns.at, known.x + np.diag(steps))
         left = evidence.residuals([known.machine, *moved])
         self._rms = dict(zip(BALANCES, np.sqrt(np.mean(left[0] ** 2, axis=0)), strict=True))
@@ -330,7 +336,7 @@ def _smoothing(machine: Machine) -> Unknown:
 def _points(kind: Kind, name: str, size: float) -> tuple[Unknown, ...]:
     """Return a curve's points as unknowns in units of a size."""
     about = quantities(UNNAMED[kind.group])[name]
-    low, high = max(about.low / size, -MOST), min(about.high / size, MOST)
+    low, high = max(about.low / size, -LARGEST_SIZE), min(about.high / size, LARGEST_SIZE)
     return tuple(
         Unknown(f"{kind.group}.{name}.{k}", about.unit, 0.0, size, low, high, 0.0, False)
         for k in range(POINTS)

@@ -11,7 +11,7 @@ import numpy as np
 
 from emir_analysis.signals import Array
 
-MOST = 0.9  # share of the squares above the noise
+LOCATED = 0.9  # share of the squares above the noise, whose time and level are told
 FEW = 0.25  # of the windows: what lies beyond a level has to lie in no more
 TIGHT = 2.0  # times as many windows as the largest ones that make up as much, at most
 
@@ -57,13 +57,13 @@ def where(
 
 def _count(loud: Array) -> int:
     """Return how many of the first values, (w,), make up most of all."""
-    return int(np.searchsorted(np.cumsum(loud), MOST * np.sum(loud))) + 1
+    return int(np.searchsorted(np.cumsum(loud), LOCATED * np.sum(loud))) + 1
 
 
 def _stretch(loud: Array, time: Array) -> tuple[float, float]:
     """Return begin and end, s, of the shortest stretch with most of the values, (w,)."""
     total = np.concatenate([[0.0], np.cumsum(loud)])
-    ends = np.searchsorted(total, total[:-1] + MOST * total[-1])
+    ends = np.searchsorted(total, total[:-1] + LOCATED * total[-1])
     inside = ends <= loud.size
     starts = np.arange(loud.size)[inside]
     best = int(np.argmin(ends[inside] - starts))

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from emir_analysis.machine_model import actuator, boom_table
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
-from emir_control.drive_plan import PARTS, Begin, Drive, HeldTask, gentlest, onward
+from emir_control.drive_plan import SUBSTEPS, Begin, Drive, HeldTask, gentlest, onward
 from emir_control.least_bending import NoMotionError, Task, limit
 from emir_control.motion_plan import Planner, UnderWay, holding
 from emir_control.prefilter import joint_angle
@@ -38,7 +38,7 @@ def _free(boom: Boom, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
 
     states = [np.zeros(2 * m + 1)]
     for u in velocity:
-        times = np.linspace(0.0, TASK.period, PARTS + 1)[1:]
+        times = np.linspace(0.0, TASK.period, SUBSTEPS + 1)[1:]
         found = solve_ivp(
             rates, (0.0, TASK.period), states[-1], t_eval=times, args=(u,), rtol=1e-8, atol=1e-12
         )
@@ -90,7 +90,7 @@ def test_a_motion_under_way_is_led_to_its_end(payload: float) -> None:
         bent=clamped.shapes.T @ (q - clamped.rigid * (boom.joint @ q)),
         swinging=clamped.shapes.T @ (swinging - clamped.rigid * (boom.joint @ swinging)),
         rate=float(boom.joint @ swinging),
-        pushed=float(before.pushed[done * PARTS]),
+        pushed=float(before.pushed[done * SUBSTEPS]),
         velocity=float(before.velocity[done - 1]),
         periods=2,
     )
@@ -102,7 +102,7 @@ def test_a_motion_under_way_is_led_to_its_end(payload: float) -> None:
     assert boom.joint @ states[:m, -1] == pytest.approx(TASK.turn, abs=1e-5)
     assert abs(boom.joint @ states[m:, -1]) < 1e-4
     assert abs(boom.deflection @ states[:m, -1]) < 0.02 * largest
-    swing = boom.deflection @ states[:m, done * PARTS :]
+    swing = boom.deflection @ states[:m, done * SUBSTEPS :]
     assert after.deflection == pytest.approx(swing, abs=1e-3 * largest)
 
 

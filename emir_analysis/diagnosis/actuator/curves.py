@@ -6,7 +6,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
-from emir_analysis.diagnosis.actuator.search import DRAWN, MUCH, Search, each, unseen_error
+from emir_analysis.diagnosis.actuator.search import MUCH, RANDOM_STARTS, Search, each, unseen_error
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.actuator import Actuator, ActuatorSheet
@@ -41,7 +41,7 @@ def measured(
     known = [found.plain.machine]
     fits = each(
         zip(CURVES, sheets, strict=True),
-        lambda named: fit(named[1], (named[0],), record, noise, known, drawn=DRAWN),
+        lambda named: fit(named[1], (named[0],), record, noise, known, drawn=RANDOM_STARTS),
     )
     best = max(range(len(fits)), key=lambda k: fits[k].evidence)
     unseen = unseen_error(sheets[best], fits[best].effects, record, noise)

@@ -25,13 +25,13 @@ from emir_plant.actuator.effects import KNOWN
 from emir_plant.actuator.model import column, run_each
 from emir_plant.actuator.model import record as flat_record
 
-STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
+DIFFERENCE_STEP = 1e-3  # of the finite differences, in units of the trial value or the logarithm
 EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
 SHORT = 5  # evaluations, after which the best of several fits are told
 ENDED = 2  # of them, which go on to the end
 ACCURACY = 1e-5  # relative, of cost and vector
 WIDE = 20.0  # a parameter whose range spans more than this factor is fitted as its logarithm
-WIDTH = 4.0  # standard deviations in the range of a data sheet's entry
+RANGE_DEVIATIONS = 4.0  # standard deviations in the range of a data sheet's entry
 TYPICAL = 2.0  # deviation of an effect's parameter from its trial value, in trial values
 TYPICAL_FACTOR = 4.0  # the same where it is fitted as its logarithm
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
@@ -210,7 +210,7 @@ class _Surplus:
         return np.hstack([deviations, weight * self._errors(points)])
 
     def _jacobian(self, x: Array, rms: float) -> Array:
-        steps = steps_inside(x, STEP, self.high)
+        steps = steps_inside(x, DIFFERENCE_STEP, self.high)
         here, *moved = self._each_at(np.vstack([x, x + np.diag(steps)]), rms)
         return np.stack([(there - here) / s for there, s in zip(moved, steps, strict=True)], 1)
 
@@ -320,7 +320,7 @@ def _stated(path: str, unit: str, value: float, low: float, high: float) -> Unkn
     """Return an entry of the data sheet with its range."""
     found = _unknown(path, unit, value, low, high)
     at = found.position(value)
-    return replace(found, expected=at, deviation=(found.high - found.low) / WIDTH)
+    return replace(found, expected=at, deviation=(found.high - found.low) / RANGE_DEVIATIONS)
 
 
 def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unknown:

@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.actuator.search import Search
 from emir_analysis.diagnosis.actuator.verdict import BALANCE, statement, verdict
 from emir_analysis.diagnosis.error_tests import ErrorTests
 from emir_analysis.diagnosis.result import (
+    INTERVAL,
     OPEN,
     BalanceResult,
     EffectResult,
@@ -28,8 +29,7 @@ from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
 
-BLOCK = 2.0  # slow periods in a block of the bootstrap
-INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
+BOOTSTRAP_BLOCK = 2.0  # slow periods in a block of the bootstrap
 LABELS = {
     "nominal": "data sheet",
     "refitted": "re-fitted",
@@ -232,9 +232,9 @@ def _signal(unit: str, noise: float, errors: dict[str, Array]) -> SignalResult:
 def _tests(
     errors: dict[str, Array], ahead: dict[str, Array], judged: ActuatorRecord, slow: float
 ) -> ErrorTests:
-    period, opening = judged.period, judged.opening
+    period, opening, block = judged.period, judged.opening, BOOTSTRAP_BLOCK * slow
     return ErrorTests(
-        {n: rms_intervals([e[:, None]], [period], BLOCK * slow)[0] for n, e in errors.items()},
+        {n: rms_intervals([e[:, None]], [period], block)[0] for n, e in errors.items()},
         {n: input_correlation(e, opening, period, slow) for n, e in errors.items()},
         {n: whiteness(e, period, slow) for n, e in ahead.items()},
     )

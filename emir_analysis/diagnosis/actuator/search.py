@@ -15,12 +15,12 @@ from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.diagnosis.select import AT_NOISE, STRONG
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
-PARTS = 4  # of the recording, each left out once: whole movements, not pieces between their like
+PARTS_LEFT_OUT = 4  # each once: whole movements, not pieces between their like
 MOST_EFFECTS = 8
 BREADTH = 3  # sets of effects that are followed at a time: the best first one may lead astray
-DRAWN = 3  # starts at random of a promising set
-DRAWN_ALONE = 8  # of a fit that knows of no other
-SETTLED = 8  # sets of which each starts once more from the others' machines
+RANDOM_STARTS = 3  # starts at random of a promising set
+RANDOM_STARTS_ALONE = 8  # of a fit that knows of no other
+SETS_SETTLED = 8  # sets of which each starts once more from the others' machines
 MUCH = 0.7  # of the error without effects, on parts left out: half of its square
 BARE_MENTION = 0.5 * math.log(10.0)  # in the evidence: "barely worth mentioning" (Jeffreys 1961)
 
@@ -55,14 +55,16 @@ def search(
     the noise of the pressure, one that is much more probable, or none.
     """
     progress("parameters only")
-    plain = fit(sheet, (), record, noise, drawn=DRAWN_ALONE)
+    plain = fit(sheet, (), record, noise, drawn=RANDOM_STARTS_ALONE)
     tried = _climbed(sheet, record, noise, plain, progress)
     progress("the best from each other's machines")
-    good = _first(tried.values(), SETTLED)
+    good = _first(tried.values(), SETS_SETTLED)
     machines = [f.machine for f in good]
     again = each(
         good,
-        lambda f: fit(sheet, f.effects, record, noise, machines, drawn=DRAWN, thorough=True),
+        lambda f: fit(
+            sheet, f.effects, record, noise, machines, drawn=RANDOM_STARTS, thorough=True
+        ),
     )
     tried |= {_key(f): f for f in again}
     _settle_below(sheet, record, noise, tried)
@@ -167,7 +169,10 @@ def _neighbours(
     )
     first = _first(first, len(first))
     better, others = first[: len(first) // 2], first[len(first) // 2 :]
-    again = each(better, lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=DRAWN))
+    again = each(
+        better,
+        lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=RANDOM_STARTS),
+    )
     return [*again, *others]
 
 
@@ -175,13 +180,13 @@ def unseen_error(
     sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord, noise: float
 ) -> float:
     """Return the RMS error of all parts, each by a fit that knows nothing of it."""
-    number = np.arange(record.pressure.size) * PARTS // record.pressure.size
-    parts = [number == part for part in range(PARTS)]
+    number = np.arange(record.pressure.size) * PARTS_LEFT_OUT // record.pressure.size
+    parts = [number == part for part in range(PARTS_LEFT_OUT)]
     known = [sheet.machine]
     fits = each(
         parts,
         lambda part: fit(
-            sheet, effects, record, noise, known, seen=~part, drawn=DRAWN_ALONE, levels=True
+            sheet, effects, record, noise, known, seen=~part, drawn=RANDOM_STARTS_ALONE, levels=True
         ),
     )
     error = np.zeros(record.pressure.size)

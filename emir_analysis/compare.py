@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.control_protocols import Stepping
+from emir_analysis.metrics import MOVING
 from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipControl
 from emir_analysis.report import new_figure
+from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import with_values
 from emir_control import pfc_file
 from emir_control.limits import LimitParameters
@@ -28,7 +30,6 @@ from emir_plant.plant import REST_PRESSURE, Plant, SimulationError
 Array = NDArray[np.float64]
 Run = dict[str, Array]
 
-MOVING = 1e-4  # m/s of reference speed
 SETTLED = 1.0  # s after the stop
 STILL = 0.005  # m of dynamic deflection
 
@@ -166,8 +167,8 @@ def _of_move(signals: Run, move: slice, end: int) -> MoveFigures:
         after=float(np.abs(bending[after]).max()),
         settled=float(np.abs(bending[settled]).max()),
         error=float(np.abs(error[move.start : end]).max()),
-        roughness=float(np.sqrt(np.mean(acceleration[whole] ** 2))),
-        error_rms=float(np.sqrt(np.mean(error[move.start : end] ** 2))),
+        roughness=rms(acceleration[whole]),
+        error_rms=rms(error[move.start : end]),
         settling=still * PLANT_PERIOD if still < bending[after].size else math.inf,
         travel=float(np.abs(np.diff(signals["valve_command"][move.start : end])).sum()),
         oil=float(pumped[whole].sum()) * PLANT_PERIOD,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_analysis.root_mean_square import rms
 from emir_analysis.run_signals import at, piston
 from emir_analysis.signals import Recording
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, CYLINDER_PREVIEW
@@ -55,7 +56,7 @@ class Definition:
 
 def tracking_error_rms(run: Recording) -> float:
     """Stroke against reference, root mean square."""
-    return float(np.sqrt(np.mean(_tracking_error(run) ** 2)))
+    return rms(_tracking_error(run))
 
 
 def tracking_error_peak(run: Recording) -> float:

@@ -26,7 +26,7 @@ from emir_analysis.parameter_files import unpacked
 from emir_analysis.recorded_orders import Obedience, orders
 from emir_analysis.recorded_parameters import Values, recorded_nodes, recorded_parameters
 from emir_analysis.replay_plant import replay_plant
-from emir_analysis.robot_replay import replay_robot
+from emir_analysis.robot_replay import PLANT, replay_robot
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_analysis.switching import Choosing, Ready, Selector, Switch
 from emir_common.parameter_tree import with_values
@@ -51,7 +51,6 @@ from emir_msgs_py.topics import (
 )
 from emir_plant.sheet import joint1
 
-PLANT = "plant"
 NODES = (
     "trajectory", "cascade", "pfc", "pfc_tip", "lqg", "mpc", "selector", "force_loop", PLANT,
 )  # fmt: skip

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from emir_analysis.metrics import Metric
+from emir_analysis.root_mean_square import rms
 from emir_analysis.run_signals import at
 from emir_analysis.signals import Recording
 from emir_msgs_py.robot_topics import JOINTS
@@ -56,11 +57,6 @@ def _robot_metrics(run: Recording) -> list[Metric]:
     lowest = None if supply is None else float(supply.min())
     pump = Metric("supply_pressure_lowest", lowest, "Pa", "Pressure at the pump.")
     return [*(Metric(*figure) for figure in figures), pump]
-
-
-def rms(values: Array) -> float:
-    """Return the root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def best(run: Recording, joint: str, quantity: str) -> str:

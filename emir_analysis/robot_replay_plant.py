@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from emir_analysis.control_protocols import Signals
 from emir_analysis.replay_plant import check_recorded, check_start, finite, number
 from emir_analysis.robot_machine import commands, sensor_signals
+from emir_analysis.robot_replay import FILES
 from emir_analysis.robot_setup import Posture
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
@@ -24,7 +25,6 @@ from emir_plant.robot.sheet import robot
 MAIN = "main."  # joint 1's parameters have no such word in front of them in the graph
 ANGLES = "initial_angles."
 PRESSURE = "initial_pressure_lowering"
-FILES = ("robot_file", "machine_file")
 
 Array = NDArray[np.float64]
 Rows = list[tuple[Signals, Signals]]

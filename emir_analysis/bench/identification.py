@@ -19,6 +19,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.record import PRESSURE, open_record
 from emir_analysis.errors import InputError
+from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array, load, read_signal_map
 
 PERIOD = 0.01  # s, of the boom's sensors
@@ -303,7 +304,7 @@ def _narx_error(seen: Data, unseen: Data, k: int, every: int) -> float | None:
     error = run(y, u, measured, unseen.command[::every], best) - measured[:, 0]
     if not np.all(np.abs(error) < DIVERGED):
         return None
-    return float(np.sqrt(np.mean(error**2)) * spread)
+    return float(rms(error) * spread)
 
 
 def _errors(run: Array, measured: Array, noise: list[float], seen: Data) -> list[float | None]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
 
 ORDERS = (1, 2, 3, 4, 6)
@@ -63,7 +64,7 @@ def train(evidence: Evidence) -> BlackBox:
                     for e in evidence.experiments
                 ]
             )
-            size = float(np.sqrt(np.mean(error**2)))
+            size = rms(error)
             if size < least:
                 best, least = (period, order), size
     return _fitted(list(evidence.experiments), evidence, best[1], best[0])

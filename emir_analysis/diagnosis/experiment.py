@@ -22,6 +22,7 @@ from emir_analysis.diagnosis.recording_checks import (
     stamps,
 )
 from emir_analysis.errors import InputError
+from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array, Recording, Signal, SignalMap, load
 from emir_plant import linkage
 from emir_plant.parameters import Machine
@@ -228,7 +229,7 @@ def _shared_span(name: str, signals: Sequence[Signal]) -> tuple[np.float64, np.f
 
 def _has_own_sensor(stroke: Array, angle: Array, machine: Machine) -> bool:
     """Tell whether a stroke, (n,) m, is not just the measured angle, (n,) rad, converted."""
-    apart = float(np.sqrt(np.mean((stroke - _strokes(angle, machine)) ** 2)))
+    apart = rms(stroke - _strokes(angle, machine))
     return machine.sensors.own_stroke == 1 or bool(apart > OWN_STROKE * noise(machine)[0])
 
 

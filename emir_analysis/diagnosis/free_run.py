@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, SUBSTEP, Experiment
+from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Array
 from emir_plant import lanes
 from emir_plant.parameters import Machine
@@ -71,11 +72,6 @@ def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | No
         return None
 
 
-def rms(error: Array) -> Array:
-    """Return the root mean square of each column."""
-    return np.asarray(np.sqrt(np.mean(np.square(error), axis=0)))
-
-
 def block_medians(errors: Sequence[Array], periods: Sequence[float], block: float = 15.0) -> Array:
     """Return the median over blocks, s, of each column's RMS: one late stick does not decide.
 
@@ -85,5 +81,5 @@ def block_medians(errors: Sequence[Array], periods: Sequence[float], block: floa
     for error, period in zip(errors, periods, strict=True):
         size = max(1, round(block / period))
         starts = range(0, max(len(error) - size // 2, 1), size)
-        blocks += [rms(error[k : k + size]) for k in starts]
+        blocks += [column_rms(error[k : k + size]) for k in starts]
     return np.asarray(np.median(blocks, axis=0))

@@ -16,8 +16,8 @@ from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import explained
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise, leaves_quiet
+from emir_analysis.root_mean_square import column_rms, rms
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -51,7 +51,7 @@ class Judged:
     def off(self, stage: str) -> float:
         """Return the RMS error of all signals together, in units of the sensors' noise."""
         errors = np.concatenate(self.errors(stage)) / self.evidence.sensors
-        return float(np.sqrt(np.mean(errors[:, self.evidence.shown] ** 2)))
+        return rms(errors[:, self.evidence.shown])
 
 
 def machines(findings: Findings) -> dict[str, Machine]:
@@ -82,7 +82,7 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
 
 def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:
     """Return the signal whose free run is furthest off, and its RMS error in units of its noise."""
-    left = rms(np.concatenate(free_run_errors(machine, evidence)))
+    left = column_rms(np.concatenate(free_run_errors(machine, evidence)))
     names = [name for name, shown in zip(OUTPUTS, evidence.shown, strict=True) if shown]
     worst = int(np.argmax(left))
     return names[worst], float(left[worst])

@@ -17,7 +17,7 @@ from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.error_tests import ErrorTests, error_tests
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
-from emir_analysis.diagnosis.free_run import block_medians, rms
+from emir_analysis.diagnosis.free_run import block_medians
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import between_steps, open_shares, untold
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
+from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY, Effects
@@ -183,10 +184,12 @@ def diagnosis(
         tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
         balances=_balances(findings),
-        signals=_signals(findings, {s: rms(np.concatenate(e)) for s, e in errors.items()}),
+        signals=_signals(findings, {s: column_rms(np.concatenate(e)) for s, e in errors.items()}),
         block_medians=_signals(findings, {s: block_medians(e, periods) for s, e in errors.items()}),
         one_step=_signals(
-            findings, {s: rms(np.concatenate(judged.one_step[s])) for s in stages}, _STEP_NOISE
+            findings,
+            {s: column_rms(np.concatenate(judged.one_step[s])) for s in stages},
+            _STEP_NOISE,
         ),
         tests=error_tests(judged, _slow_period(findings)),
         parameters={path: p for path, p in fitted.items() if path in findings.sheet.tolerances},

@@ -17,7 +17,6 @@ from emir_analysis.diagnosis.candidates import (
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.foresight import explained
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.late_end import with_a_late_end
 from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
@@ -37,6 +36,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
 from emir_analysis.diagnosis.whole import Progress, Whole
+from emir_analysis.root_mean_square import column_rms
 from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
@@ -88,8 +88,8 @@ class Search:
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
         errors = free_run_errors(self.refitted.machine, self._evidence)
-        within = rms(np.concatenate(errors)) <= AT_NOISE  # not where there is no free run: NaN
-        if np.all(within) and self._quiet(self.balanced):
+        left = column_rms(np.concatenate(errors))  # NaN where there is no free run
+        if np.all(left <= AT_NOISE) and self._quiet(self.balanced):
             self.tried = [self._scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
         plain = self._scored(

@@ -12,7 +12,6 @@ from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
-from emir_analysis.diagnosis.free_run import rms
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.screening import LOAD
@@ -21,6 +20,7 @@ from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.where import LOCATED, Where
+from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples

@@ -11,6 +11,7 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP
 from emir_analysis.diagnosis.free_run import ANGLE, free_runs
 from emir_analysis.diagnosis.select import STRONG, free_run_score
 from emir_analysis.diagnosis.unknowns import is_share
+from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 
@@ -121,9 +122,5 @@ def _apart(rivals: Sequence[Trial], commands: Array, evidence: Evidence) -> floa
     machines = [trial.machine for trial in rivals]
     runs = free_runs(machines, experiment, [begin] * len(machines))[:, :, ANGLE + 1 :]
     shown = (runs / evidence.sensors)[:, :, evidence.shown]
-    differences = [
-        float(np.sqrt(np.mean((shown[i] - shown[j]) ** 2)))
-        for i in range(len(rivals))
-        for j in range(i)
-    ]
+    differences = [rms(shown[i] - shown[j]) for i in range(len(rivals)) for j in range(i)]
     return float(np.nan_to_num(min(differences), nan=0.0))

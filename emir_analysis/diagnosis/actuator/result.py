@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.result import (
 )
 from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
+from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
@@ -156,7 +157,7 @@ def diagnosis(
     word = verdict(sheet, found, noise)
     said = statement(word, found, noise, curve)
     if judge is not None and sheet.machine.sensor.pressure_noise:
-        word, said = _judged(word, said, judge.name, _rms(errors["with_effect"]) / noise)
+        word, said = _judged(word, said, judge.name, rms(errors["with_effect"]) / noise)
     return ActuatorDiagnosis(
         verdict=word,
         statement=said,
@@ -226,7 +227,7 @@ def _unit(unit: str, result: ActuatorDiagnosis) -> str:
 
 
 def _signal(unit: str, noise: float, errors: dict[str, Array]) -> SignalResult:
-    return SignalResult(unit, noise, **{name: _rms(error) for name, error in errors.items()})
+    return SignalResult(unit, noise, **{name: rms(error) for name, error in errors.items()})
 
 
 def _tests(
@@ -273,11 +274,7 @@ def _balance(
     def missing(machine: Actuator) -> float:
         modelled = driven(machine, record.opening, record.pressure, record.period)
         rest = record.pressure - modelled
-        return _rms(rest[window:] - rest[:-window])
+        return rms(rest[window:] - rest[:-window])
 
     figures = (missing(machine) for machine in machines.values())
     return BalanceResult(record.unit, math.sqrt(2.0) * noise, *figures)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

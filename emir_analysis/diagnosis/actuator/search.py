@@ -13,6 +13,7 @@ import numpy as np
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.diagnosis.select import AT_NOISE, STRONG
+from emir_analysis.root_mean_square import rms
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
 PARTS_LEFT_OUT = 4  # each once: whole movements, not pieces between their like
@@ -192,7 +193,7 @@ def unseen_error(
     error = np.zeros(record.pressure.size)
     for part, fitted in zip(parts, fits, strict=True):
         error[part] = free_run_error(fitted.machine, record)[part]
-    return float(np.sqrt(np.mean(error**2)))
+    return rms(error)
 
 
 def each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:

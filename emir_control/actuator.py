@@ -20,6 +20,7 @@ from emir_common.quantity import check_ranges, quantity
 from emir_control.prefilter import PrefilterParameters
 
 LAMINAR = 1e5  # Pa, below which a drop's square root turns into a straight line
+LEAST_OPEN = 0.05  # logic block: what the inverse reckons with at least
 TOLERANCE = 1e-5  # of the opening
 ITERATIONS = 30
 
@@ -63,6 +64,10 @@ class Oil(NamedTuple):
     lifting: float
     lowering: float
     logic: float = 1.0
+
+    def with_open_block(self) -> "Oil":
+        """Return the oil with a logic block that is not shut, as the drive's inverse wants it."""
+        return self._replace(logic=max(self.logic, LEAST_OPEN))
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 from emir_common.quantity import check_ranges, quantity
-from emir_control.actuator import Actuator, ActuatorParameters, Oil
+from emir_control.actuator import LEAST_OPEN, Actuator, ActuatorParameters, Oil
 from emir_control.filters import low_pass
 from emir_control.force_loop import ForceLoopOutputs
 from emir_control.limits import LimitParameters, limited, off_the_ends
-
-LEAST_OPEN = 0.05  # logic block: what the drive's inverse reckons with at least
 
 
 @dataclass(frozen=True, kw_only=True)

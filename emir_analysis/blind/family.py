@@ -9,7 +9,8 @@ import numpy as np
 from emir_analysis.blind.actuator import hidden as actuator_hidden
 from emir_analysis.blind.actuator import recording as actuator_recording
 from emir_analysis.blind.actuator.puzzle import puzzle as actuator_puzzle
-from emir_analysis.blind.hidden import CATALOGUE, Hidden
+from emir_analysis.blind.catalogue import CATALOGUE
+from emir_analysis.blind.hidden import Hidden
 from emir_analysis.blind.numbers import DATA_SHEET, data_sheet, read_numbers, signal_map
 from emir_analysis.blind.plan import Plan, foreign_effects
 from emir_analysis.blind.puzzle import puzzle

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from emir_analysis.blind.hidden import CATALOGUE, Hidden, Random
+from emir_analysis.blind.catalogue import CATALOGUE
+from emir_analysis.blind.hidden import Hidden, Random
 from emir_analysis.blind.machine import Array, Machine, NotSolvedError, Sizes
 from emir_analysis.blind.numbers import Numbers, Stated
 from emir_analysis.blind.operator import Operator

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from emir_analysis.blind.hidden import (
-    HYDRAULIC,
     Hidden,
     Random,
     Scale,
@@ -19,7 +18,7 @@ from emir_analysis.blind.hidden import (
     nominal_hose,
     nominal_speed,
 )
-from emir_analysis.blind.machine import Array, Sizes
+from emir_analysis.blind.machine import HYDRAULIC, Array, Sizes
 
 ADIABATIC = 1.4  # of nitrogen
 SEAT = 2e5  # Pa, over which a bladder leaves its seat

@@ -11,7 +11,6 @@ import numpy as np
 
 from emir_analysis.blind.boom import GRAVITY
 from emir_analysis.blind.hidden import (
-    HYDRAULIC,
     P_H,
     P_S,
     Hidden,
@@ -25,7 +24,7 @@ from emir_analysis.blind.hidden import (
     nominal_leak,
     nominal_speed,
 )
-from emir_analysis.blind.machine import Array, Sizes
+from emir_analysis.blind.machine import HYDRAULIC, Array, Sizes
 from emir_analysis.blind.numbers import Numbers
 
 

@@ -12,8 +12,9 @@ from emir_analysis.blind import campaign as campaigns
 from emir_analysis.blind import puzzle as puzzles
 from emir_analysis.blind import trial as trials
 from emir_analysis.blind.campaign import campaign, workers
+from emir_analysis.blind.catalogue import CATALOGUE
 from emir_analysis.blind.family import Secret, family
-from emir_analysis.blind.hidden import CATALOGUE, Hidden
+from emir_analysis.blind.hidden import Hidden
 from emir_analysis.blind.machine import NotSolvedError
 from emir_analysis.blind.numbers import (
     DATA_SHEET,

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import emir_analysis.blind
-from emir_analysis.blind import hidden
+from emir_analysis.blind import hidden_mechanics, hidden_oil, hidden_sensors, hidden_valve
 from emir_analysis.blind.boom import boom
-from emir_analysis.blind.machine import Machine
+from emir_analysis.blind.catalogue import CATALOGUE
+from emir_analysis.blind.hidden import Hidden
+from emir_analysis.blind.machine import Array, Machine
 from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
 from emir_analysis.blind.plan import foreign_effects
 from emir_analysis.blind.recording import Run, Start, repeated
@@ -35,7 +37,7 @@ SIGNALS = {  # a tenth of the sensor noise, or of the resolver's step as RMS
 }
 
 
-def moves(seconds: float) -> hidden.Array:
+def moves(seconds: float) -> Array:
     """Return up, rest, down hard, so that the logic block shuts: commands every 32 ms."""
     time = np.arange(0.0, seconds, STATED.command_period)
     command = np.where(time < 0.3, 0.0, 0.55)
@@ -45,7 +47,7 @@ def moves(seconds: float) -> hidden.Array:
     return command
 
 
-def of_plant(effects: dict[str, float], commands: hidden.Array) -> dict[str, hidden.Array]:
+def of_plant(effects: dict[str, float], commands: Array) -> dict[str, Array]:
     """Return what the sensors of the project's machine show, without noise."""
     machine = with_values(SHEET, {f"effects.{path}": value for path, value in effects.items()})
     plant = Plant(machine)
@@ -54,7 +56,7 @@ def of_plant(effects: dict[str, float], commands: hidden.Array) -> dict[str, hid
     return readings(plant, truth, 0.01)._asdict()
 
 
-def apart(run: Run, other: dict[str, hidden.Array]) -> dict[str, float]:
+def apart(run: Run, other: dict[str, Array]) -> dict[str, float]:
     """Return the RMS between two runs by signal."""
 
     def rms(name: str) -> float:
@@ -98,12 +100,12 @@ def test_a_healthy_machine_moves_as_the_projects_own() -> None:
 
 
 # sizes here, and the same in the registry
-SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
-    hidden.CoulombFriction: (
+SAME: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
+    hidden_mechanics.CoulombFriction: (
         {"coulomb_force": 2e4, "coulomb_smoothing": 1e-3},
         {"force": 2e4, "smoothing_speed": 1e-3, "gradual_share": 1.0},
     ),
-    hidden.StribeckFriction: (
+    hidden_mechanics.StribeckFriction: (
         {
             "stribeck_force": 1e4,
             "stribeck_breakaway": 2.0,
@@ -118,54 +120,54 @@ SAME: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
             "gradual_share": 1.0,
         },
     ),
-    hidden.ViscousFriction: ({"viscous": 2e5}, {"coefficient": 2e5}),
-    hidden.PressureDependentFriction: (
+    hidden_mechanics.ViscousFriction: ({"viscous": 2e5}, {"coefficient": 2e5}),
+    hidden_mechanics.PressureDependentFriction: (
         {"share_of_load": 0.03, "share_smoothing": 1e-3},
         {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0},
     ),
-    hidden.Payload: ({"mass": 300.0}, {"mass": 300.0}),
-    hidden.ExternalLoad: (
+    hidden_mechanics.Payload: ({"mass": 300.0}, {"mass": 300.0}),
+    hidden_mechanics.ExternalLoad: (
         {"load": 1e3, "load_start": 1.0, "load_duration": 2.0, "load_frequency": 0.0},
         {"force": 1e3, "start": 1.0, "duration": 2.0},
     ),
-    hidden.LinkageError: (
+    hidden_mechanics.LinkageError: (
         {"arm_scale": 0.01, "arm_slope": -0.03},
         {"scale": 0.01, "slope": -0.03},
     ),
-    hidden.InternalLeakage: ({"past_piston": 1e-11}, {"coefficient": 1e-11}),
-    hidden.ExternalLeakage: ({"leak_lowering": 1e-11}, {"lowering": 1e-11}),
-    hidden.EntrainedAir: (
+    hidden_oil.InternalLeakage: ({"past_piston": 1e-11}, {"coefficient": 1e-11}),
+    hidden_oil.ExternalLeakage: ({"leak_lowering": 1e-11}, {"lowering": 1e-11}),
+    hidden_oil.EntrainedAir: (
         {"air": 0.02, "polytropic": 1.2, "swells_down_to": 5e3},
         {"share": 0.02, "exponent": 1.2, "least_pressure": 5e3},
     ),
-    hidden.VesselCompliance: ({"hose_lifting": 5e-11}, {"lifting": 5e-11}),
-    hidden.SupplyPressureDroop: (
+    hidden_oil.VesselCompliance: ({"hose_lifting": 5e-11}, {"lifting": 5e-11}),
+    hidden_oil.SupplyPressureDroop: (
         {"droop": 2e10, "droop_time": 0.2},
         {"resistance": 2e10, "time_constant": 0.2},
     ),
-    hidden.ValveNullOffset: ({"null": 0.03}, {"offset": 0.03}),
-    hidden.ValveGainAsymmetry: ({"gain_lowering": 0.1}, {"lowering": 0.1}),
-    hidden.ValveDeadZoneError: ({"overlap": 0.03}, {"error": 0.03}),
-    hidden.ValveHysteresis: ({"spool_play": 0.04}, {"width": 0.04}),
-    hidden.CommandDelay: ({"late": 0.045}, {"delay": 0.045}),
-    hidden.FlowGainDrift: (
+    hidden_valve.ValveNullOffset: ({"null": 0.03}, {"offset": 0.03}),
+    hidden_valve.ValveGainAsymmetry: ({"gain_lowering": 0.1}, {"lowering": 0.1}),
+    hidden_valve.ValveDeadZoneError: ({"overlap": 0.03}, {"error": 0.03}),
+    hidden_valve.ValveHysteresis: ({"spool_play": 0.04}, {"width": 0.04}),
+    hidden_valve.CommandDelay: ({"late": 0.045}, {"delay": 0.045}),
+    hidden_valve.FlowGainDrift: (
         {"drift": 0.3, "drift_time": 10.0},
         {"change": -0.3 * math.expm1(-6.0), "time_constant": 10.0},  # in a minute
     ),
-    hidden.LogicBlockFault: ({"threshold_off": 3e6}, {"threshold": 3e6}),
-    hidden.Backlash: (
+    hidden_oil.LogicBlockFault: ({"threshold_off": 3e6}, {"threshold": 3e6}),
+    hidden_mechanics.Backlash: (
         {"gap": 3e-3, "seating": 2e5, "crossing": 0.02},
         {"gap": 3e-3, "seating_force": 2e5, "crossing_time": 0.02, "gradual_share": 1.0},
     ),
-    hidden.SensorBias: ({"bias_angle": 0.01}, {"angle": 0.01}),
-    hidden.SensorGain: ({"gain_pressure_lifting": 0.03}, {"pressure_lifting": 0.03}),
-    hidden.SensorDelay: ({"lag_pressure_lowering": 0.05}, {"pressure_lowering": 0.05}),
+    hidden_sensors.SensorBias: ({"bias_angle": 0.01}, {"angle": 0.01}),
+    hidden_sensors.SensorGain: ({"gain_pressure_lifting": 0.03}, {"pressure_lifting": 0.03}),
+    hidden_sensors.SensorDelay: ({"lag_pressure_lowering": 0.05}, {"pressure_lowering": 0.05}),
 }
 
 
-_OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text(), hidden.Hidden)
+_OTHERS = foreign_effects((Path(__file__).parent / "foreign_forms.py").read_text(), Hidden)
 _OTHER = {kind.name: kind for kind in _OTHERS}
-FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
+FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
     _OTHER["internal_leakage~turbulent"]: (  # 1e-11 (100 bar)^0.5
         {"scratch": 1e-11 * 1e7**0.5},
         {"coefficient": 1e-11, "turbulent_share": 1.0},
@@ -235,14 +237,14 @@ FORMS: dict[type[hidden.Hidden], tuple[dict[str, float], dict[str, float]]] = {
 
 
 @pytest.fixture(scope="module")
-def healthy() -> dict[str, hidden.Array]:
+def healthy() -> dict[str, Array]:
     """The project's machine without effects."""
     return of_plant({}, moves(5.0))
 
 
 @pytest.mark.parametrize("kind", SAME | FORMS, ids=lambda kind: kind.name)
 def test_an_effect_written_twice_does_the_same(
-    kind: type[hidden.Hidden], healthy: dict[str, hidden.Array]
+    kind: type[Hidden], healthy: dict[str, Array]
 ) -> None:
     commands = moves(5.0)
     here, there = (SAME | FORMS)[kind]
@@ -257,13 +259,13 @@ def test_an_effect_written_twice_does_the_same(
 
 
 def test_all_of_the_catalogue_is_compared() -> None:
-    assert set(hidden.CATALOGUE) == SAME.keys()
+    assert set(CATALOGUE) == SAME.keys()
     assert set(_OTHERS) == FORMS.keys()
 
 
 def test_two_effects_act_together() -> None:
     commands = moves(5.0)
-    both: Any = type("Both", (hidden.ValveNullOffset, hidden.InternalLeakage), {})
+    both: Any = type("Both", (hidden_valve.ValveNullOffset, hidden_oil.InternalLeakage), {})
     run = repeated(both(STATED, {"null": 0.03, "past_piston": 1e-11}), START, commands)
     names = {"valve_null_offset.offset": 0.03, "internal_leakage.coefficient": 1e-11}
     for name, error in apart(run, of_plant(names, commands)).items():
@@ -272,7 +274,7 @@ def test_two_effects_act_together() -> None:
 
 def test_any_two_effects_go_together_in_either_order() -> None:
     random = np.random.default_rng(1)
-    for one, other in permutations(hidden.CATALOGUE, 2):
+    for one, other in permutations(CATALOGUE, 2):
         both: Any = type("Both", (one, other), {})
         machine = both(STATED, one.draw(random) | other.draw(random))
         x = machine.start(START.angle, START.p_s)
@@ -291,7 +293,7 @@ def test_any_two_effects_go_together_in_either_order() -> None:
 )
 def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
     source = (Path(__file__).parent / file).read_text()
-    for effect in foreign_effects(source, hidden.Hidden):
+    for effect in foreign_effects(source, Hidden):
         machine = effect(STATED, effect.drawn(np.random.default_rng(1), STATED))
         x = machine.start(START.angle, START.p_s)
         rates = machine.rates(x, 0.0, 0.0)

@@ -263,62 +263,9 @@ def _analyze(words: list[str]) -> int:
 
 
 def _compare(words: list[str]) -> int:
-    from emir_analysis.compare_command import command
+    from emir_analysis.compare_command import command, parser
 
-    about = (
-        "Every controller on the same moves of the nonlinear machine. Without --angle, --payload,"
-        " --size and --error: a grid of 36 cases (45 and 60 deg; 0, 750 and 1500 kg; 20 and"
-        " 63.75 mm; three model errors). With any of these: a grid of what they name, the others"
-        " at 45 deg, 0 kg, 63.75 mm, none. One case alone gives curves in place of a grid."
-    )
-    parser = argparse.ArgumentParser(prog="emir compare", description=about)
-    parser.add_argument(
-        "--angle", type=float, nargs="+", metavar="DEG", help="of the boom at the start"
-    )
-    parser.add_argument(
-        "--payload", type=float, nargs="+", metavar="KG",
-        help="at the TCP; the controllers are not told how much it is",
-    )  # fmt: skip
-    parser.add_argument(
-        "--size", type=float, nargs="+", metavar="MM", help="of the move, stroke of the piston"
-    )
-    parser.add_argument(
-        "--error", nargs="+", metavar="NAME",
-        help="how the machine differs from what the controllers know: none, 'oil -20%%',"
-        " 'oil +20%%', 'return -30%%', 'return +30%%', 'friction 5 kN', 'hysteresis 1%%'",
-    )  # fmt: skip
-    parser.add_argument(
-        "--trajectory", default="lift-lower", metavar="NAME",
-        help="lift-lower (default) or lower-lift",
-    )  # fmt: skip
-    parser.add_argument(
-        "--controllers", nargs="+", metavar="NAME",
-        help="some of cascade, zv, zvd, lqg, mpc; 'pfc, WHAT' and 'pfc_tip, WHAT' with preview,"
-        " velocity, constant or scheduled for WHAT; default: all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--repeat", type=int, default=1, metavar="N",
-        help="of one case: mean and deviation of N runs with other sensor noise; default 1",
-    )  # fmt: skip
-    parser.add_argument(
-        "--pfc", type=Path, metavar="FILE",
-        help="design of pfc, made by emir design; default: that of the project",
-    )  # fmt: skip
-    parser.add_argument("--pfc-tip", type=Path, metavar="FILE", help="the same of pfc_tip")
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw what the table shows")
-    parser.add_argument(
-        "--csv", type=Path, metavar="FILE", help="of a grid: write the figures of every move"
-    )
-    parser.add_argument(
-        "--trade-off", action="store_true",
-        help="instead: bending over tracking error of the cascade, for 24 pairs of k_p and T,"
-        " beside the other controllers",
-    )  # fmt: skip
-    parser.add_argument(
-        "--damping", action="store_true",
-        help="instead: the machine damped by force feedback, and by a capillary line",
-    )  # fmt: skip
-    options = parser.parse_args(words)
+    options = parser().parse_args(words)
     return _said(str, lambda: command(options, _progress))
 
 

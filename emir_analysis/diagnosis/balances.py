@@ -28,9 +28,7 @@ from emir_analysis.diagnosis.experiment import (
     STROKE,
     Experiment,
 )
-from emir_analysis.diagnosis.free_run import ANGLE as ANGLE_COLUMN
-from emir_analysis.diagnosis.free_run import STROKE as STROKE_COLUMN
-from emir_analysis.diagnosis.free_run import coarse_step, free_runs
+from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, coarse_step, free_runs
 from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array

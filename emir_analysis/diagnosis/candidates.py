@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, Solution, fit
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
@@ -326,7 +326,7 @@ def free_run_problem(start: Trial, evidence: Evidence, x: Array, share: float = 
 def free_run(machine: Machine, experiment: Experiment, evidence: Evidence) -> Array:
     """Return the free run's outputs, (n, 4), SI units, from the state `at_rest`."""
     start = at_rest(machine, experiment, evidence)
-    return free_runs([machine], experiment, [start])[0, :, ANGLE + 1 :]
+    return free_runs([machine], experiment, [start])[0, :, COMPARED]
 
 
 @lru_cache(maxsize=16)  # several criteria ask for those of one machine
@@ -405,6 +405,6 @@ def _free_run_errors(
     coarse: bool = False,
 ) -> Array:
     """Return weighted errors in units of the noise, one row for each machine."""
-    runs = free_runs(machines, experiment, starts, coarse=coarse)[:, :, ANGLE + 1 :]
+    runs = free_runs(machines, experiment, starts, coarse=coarse)[:, :, COMPARED]
     error = (runs - experiment.outputs) * experiment.weights / evidence.sensors
     return np.asarray(error[:, :, evidence.shown].reshape(len(machines), -1))

@@ -14,7 +14,7 @@ from emir_control.trajectory import AwayAndBack, TrajectoryParameters
 from emir_plant.parameters import Machine
 from emir_plant.plant import SimulationError
 
-ANGLE = float(np.pi / 4.0)  # rad, of the boom, as in the paper's moves
+START_ANGLE = float(np.pi / 4.0)  # rad, of the boom, as in the paper's moves
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def before_and_after(
 
 def _on(machine: Machine, model: Machine) -> ControlResult:
     outer = PfcControl(Pfc(design_pfc(model, DesignTask())))
-    signals = run(machine, AwayAndBack(TrajectoryParameters()), outer, ANGLE)
+    signals = run(machine, AwayAndBack(TrajectoryParameters()), outer, START_ANGLE)
     moves = figures(signals)
     deflection = float(np.max(np.abs(dynamic_deflection(signals))))
     return ControlResult(tracking=max(move.error for move in moves), tcp=deflection)

@@ -12,7 +12,7 @@ import numpy as np
 from emir_analysis.diagnosis.candidates import Trial, at_rest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.select import EXPLAINED, excess
 from emir_analysis.diagnosis.stick_slip import DECIDED
@@ -54,5 +54,5 @@ def _apart(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arra
     sensors = evidence.stated.sensors
     half_step = 0.5 * sensors.resolver_step
     starts = [(angle + half_step * start, pressure) for start in STARTS]
-    runs = free_runs([machine] * len(starts), experiment, starts)[:, :, ANGLE + 1 :]
+    runs = free_runs([machine] * len(starts), experiment, starts)[:, :, COMPARED]
     return np.asarray(np.var(runs / evidence.sensors, axis=0)[:, evidence.shown])

@@ -13,7 +13,8 @@ from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import readings, undistorted
 
 SHOWN = ("angle", "stroke", "pressure_lifting", "pressure_lowering", "deflection")
-ANGLE, STROKE = 0, 1  # the resolver's; the others are the compared outputs, in the order of OUTPUTS
+ANGLE_COLUMN, STROKE_COLUMN = 0, 1  # of what is shown
+COMPARED = slice(1, None)  # columns behind the resolver's angle: in the order of OUTPUTS
 
 STABLE = 2.0  # rad, of the fastest oscillation in a step; Runge-Kutta 4 is unstable above 2.8
 

@@ -8,7 +8,7 @@ from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP
-from emir_analysis.diagnosis.free_run import ANGLE, free_runs
+from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.select import STRONG, free_run_score
 from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.root_mean_square import rms
@@ -120,7 +120,7 @@ def _apart(rivals: Sequence[Trial], commands: Array, evidence: Evidence) -> floa
     start = experiment.start()
     begin = (start[0], evidence.stated.supply.pT if np.isnan(start[1]) else start[1])
     machines = [trial.machine for trial in rivals]
-    runs = free_runs(machines, experiment, [begin] * len(machines))[:, :, ANGLE + 1 :]
+    runs = free_runs(machines, experiment, [begin] * len(machines))[:, :, COMPARED]
     shown = (runs / evidence.sensors)[:, :, evidence.shown]
     differences = [rms(shown[i] - shown[j]) for i in range(len(rivals)) for j in range(i)]
     return float(np.nan_to_num(min(differences), nan=0.0))

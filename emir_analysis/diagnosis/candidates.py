@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, Solution, fit
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, Solution, fit, mean_squares
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
@@ -182,8 +182,7 @@ def fit_free_run(start: Trial, evidence: Evidence) -> Trial:
     accuracy = FREE_RUN_ACCURACY if begun.misfit < HOPELESS else HOPELESS_ACCURACY
     # what acts late is not told by the beginning, and may have been led astray there
     whole = free_run_problem(start, evidence, x)
-    cost = np.mean(np.square(whole.model(np.array(begins))), axis=1)
-    best = begins[int(np.argmin(np.nan_to_num(cost, nan=np.inf)))]
+    best = begins[int(np.argmin(mean_squares(whole.model(np.array(begins)))))]
     return start.continued(fit(replace(whole, start=best), accuracy))
 
 
@@ -198,8 +197,7 @@ def shapes(start: Trial, effect: str, evidence: Evidence) -> list[Trial]:
     """Return the trial with other shapes of an effect, those first whose free run is best."""
     points = _shapes(start, effect)
     errors = coarse_errors([start.unknowns.at(x) for x in points], evidence)
-    cost = np.mean(np.square(errors), axis=1)
-    return [start.at(points[k]) for k in np.argsort(np.nan_to_num(cost, nan=np.inf))]
+    return [start.at(points[k]) for k in np.argsort(mean_squares(errors))]
 
 
 def _shapes(start: Trial, effect: str) -> Array:

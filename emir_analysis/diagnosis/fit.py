@@ -143,7 +143,7 @@ def descended(problem: Problem, accuracy: float) -> Solution:
             taken = True
         tried = np.vstack([neighbours, held.steps(x, residuals, slopes)])
         left = held.residuals(tried)
-        costs = np.nan_to_num(np.mean(np.square(left), axis=1), nan=np.inf)
+        costs = mean_squares(left)
         best = int(np.argmin(costs))
         foreseen = residuals + slopes @ (tried[best] - x)
         promised = cost - float(np.mean(np.square(foreseen)))
@@ -155,6 +155,11 @@ def descended(problem: Problem, accuracy: float) -> Solution:
             break
         sound, taken = gained > max(least, KEPT * promised), False
     return Solution(x, held.covariance(slopes, residuals), math.sqrt(cost), slopes.T @ slopes)
+
+
+def mean_squares(residuals: Array) -> Array:
+    """Return the mean square of each row, (m,), of (m, n); infinite where it is not all numbers."""
+    return np.asarray(np.nan_to_num(np.mean(np.square(residuals), axis=1), nan=np.inf))
 
 
 def _impossible(start: Array) -> Solution:
@@ -244,7 +249,7 @@ class _Held:
         outside = np.any((x + steps < problem.low) | (x + steps > problem.high), axis=1)
         points = np.clip(x + np.where(outside[:, None], -steps, steps), problem.low, problem.high)
         values = self.residuals(points)
-        costs = np.nan_to_num(np.mean(np.square(values), axis=1), nan=np.inf)
+        costs = mean_squares(values)
         near = costs <= FAR * np.mean(np.square(residuals))
         moved = points[near] - x
         unforeseen = values[near] - residuals - moved @ former.T

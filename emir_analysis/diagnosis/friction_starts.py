@@ -14,7 +14,12 @@ from scipy.optimize import least_squares
 
 from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, TOLERANCE_SPREAD, steps_inside
+from emir_analysis.diagnosis.fit import (
+    DIFFERENCE_STEP,
+    TOLERANCE_SPREAD,
+    mean_squares,
+    steps_inside,
+)
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.signals import Array
 
@@ -36,8 +41,7 @@ def friction_starts(start: Trial, evidence: Evidence, floor: Array, first: float
     """
     points = _by_balances(start, evidence, floor)
     errors = coarse_errors([start.unknowns.at(x) for x in points], evidence.until(first))
-    cost = np.mean(np.square(errors), axis=1)
-    return [start.at(points[k]) for k in np.argsort(np.nan_to_num(cost, nan=np.inf))]
+    return [start.at(points[k]) for k in np.argsort(mean_squares(errors))]
 
 
 def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fit import mean_squares
 from emir_analysis.diagnosis.screening import LOAD
 
 DURATION = f"effects.{LOAD}.duration"
@@ -28,5 +29,4 @@ def with_a_late_end(loaded: Trial, evidence: Evidence, seen: float) -> Trial:
     points = np.tile(loaded.x, (lasting.size + 1, 1))
     points[1:, k] = [loaded.unknowns.members[k].at(float(duration)) for duration in lasting]
     errors = coarse_errors([loaded.unknowns.at(x) for x in points], evidence)
-    cost = np.nan_to_num(np.mean(np.square(errors), axis=1), nan=np.inf)
-    return loaded.at(points[int(np.argmin(cost))])
+    return loaded.at(points[int(np.argmin(mean_squares(errors)))])

@@ -20,7 +20,7 @@ from emir_control.trajectory import NO_MOVE, Move
 
 @dataclass(frozen=True)
 class Beginning:
-    """How states begin; with the drive and the planner for which they do."""
+    """How a state begins; holds the drive and the planner that all of the control shares."""
 
     parameters: LqgParameters
 

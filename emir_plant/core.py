@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import dry_friction
+from emir_plant import bristles, dry_friction
 from emir_plant.effects import (
     backlash,
     command_delay,
@@ -37,13 +37,15 @@ EDGES = 7  # 1, where the play of the spool has left the metering edges
 OFFSET = 8  # m, of the piston against the joint
 LATE_ANGLE, LATE_P_H, LATE_P_S, LATE_DEFLECTION, LATE_STROKE = 9, 10, 11, 12, 13  # of sensors
 PLAYED = 14  # 1, the command behind the valve's play
-DELAY_LINE = 15  # of the command, see command_delay.py
+BRISTLES = 15  # N, force of the seals' bristles
+DELAY_LINE = 16  # of the command, see command_delay.py
 MODES = DELAY_LINE + command_delay.SIZE
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 SETTLING = 2.0  # of play and oil in a step; Runge-Kutta 4 is unstable above 2.8
 CROSSING = 2e-4  # s, step while play and oil settle too fast to be followed: a flank is met in one
 FASTEST = 0.3  # m/s, of a piston: more than a valve (EMIR: Q_n / A_H = 55 mm/s) and a swing make
+OF_FASTEST = 0.5  # rad, of the fastest mode in a step that ...
 FINER = 4  # times shorter steps where dry friction keeps the fastest mode swinging
 
 
@@ -74,6 +76,7 @@ class _Motion(NamedTuple):
     tip_angle: float  # alpha_6, rad
     arm: float  # dh/dalpha, m
     stroke: float  # of the piston, m
+    joint_stroke: float  # the same without the piston's play, m
     velocity: float  # of the piston, m/s
     joint_velocity: float  # the same without the piston's play, m/s
     force: float  # of the oil on the piston, N
@@ -93,6 +96,14 @@ class _Allowed(NamedTuple):
     left: float  # s, at most
     usual: float  # s, without dry friction
     crossing: bool  # play and oil settle too fast for it
+
+
+class _Seals(NamedTuple):
+    """The seals' bristles at the start of a step."""
+
+    are: bool  # there are any
+    force: float  # N
+    stroke: float  # of the joint, m
 
 
 class _Oil(NamedTuple):
@@ -119,12 +130,13 @@ def _standing(x: Array, p: Any) -> _Motion:
         tip_angle += p.mode_tip_angle[i] * x[MODES + i]
         turning += p.mode_joint[i] * x[MODES + n + i]
     arm = linkage_error.lever_arm(angle, p)
-    joint_velocity = arm * turning
+    joint_stroke, joint_velocity = linkage_error.stroke(angle, p), arm * turning
     return _Motion(
         angle,
         tip_angle,
         arm,
-        linkage_error.stroke(angle, p) + x[OFFSET],
+        joint_stroke + x[OFFSET],
+        joint_stroke,
         joint_velocity,
         joint_velocity,
         chambers.piston_force(x[P_H], x[P_S], p),
@@ -140,6 +152,7 @@ def _crossing(standing: _Motion, rate: float) -> _Motion:
         standing.tip_angle,
         standing.arm,
         standing.stroke,
+        standing.joint_stroke,
         standing.joint_velocity + rate,
         standing.joint_velocity,
         standing.force,
@@ -186,8 +199,13 @@ def write_derivative(x: Array, command: float, parameters: NDArray[Any], dx: Arr
 def write_derivative_of(x: Array, command: float, p: Any, dx: Array) -> None:
     """As `write_derivative`, with the parameters of one machine."""
     motion = _motion(x, p)
-    dry = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
-    _write_rates(x, command, motion, dry, p, dx)
+    if terms.has_bristles(p):
+        force, velocity, b = x[BRISTLES], motion.joint_velocity, _bristles(motion, p)
+        _write_rates(x, command, motion, bristles.friction(force, velocity, b), p, dx)
+        dx[BRISTLES] = b.stiffness * bristles.bending(force, velocity, b)
+    else:
+        dry = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
+        _write_rates(x, command, motion, dry, p, dx)
 
 
 @compiled_in_place
@@ -215,7 +233,7 @@ def _write_rates(  # noqa: PLR0913, PLR0917 (compiled code has no object to bund
     dx[LOGIC] = logic_block.opening_rate(x[LOGIC], pilot, p)
     dx[TIME] = 1.0
     dx[DROOP] = supply_pressure_droop.rate(x[DROOP], pumped, p)
-    dx[EDGES] = dx[PLAYED] = 0.0  # `remember` and `_advance` move them
+    dx[EDGES] = dx[PLAYED] = dx[BRISTLES] = 0.0  # `remember`, `_advance` and `_step` move them
     dx[OFFSET] = motion.offset_rate
     _write_lags(x, motion, p, dx)
     _write_boom(x, motion, dry, p, dx)
@@ -342,22 +360,44 @@ def _oil(x: Array, stroke: float, p: Any) -> _Oil:
 def _step(x: Array, command: float, allowed: _Allowed, p: Any, work: Array) -> float:
     """Advance x in place by one step of Runge-Kutta 4; return the step, s."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
-    dry = _write_first_rates(x, command, allowed, p, k1)
+    seals = _seals(x, p)
+    dry = _write_first_rates(x, command, allowed, seals, p, k1)
     h = dry.step
     play = _Play(0.0, False)
     if allowed.crossing:
         play = _cross(x, h, p, k1)
     write_sum(x, 0.5 * h, k1, p, between)
-    _write_later_rates(between, command, dry, play, p, k2)
+    _write_later_rates(between, command, dry, play, seals, p, k2)
     write_sum(x, 0.5 * h, k2, p, between)
-    _write_later_rates(between, command, dry, play, p, k3)
+    _write_later_rates(between, command, dry, play, seals, p, k3)
     write_sum(x, h, k3, p, between)
-    _write_later_rates(between, command, dry, play, p, k4)
+    _write_later_rates(between, command, dry, play, seals, p, k4)
     advance_by(x, h, work, p)
     x[P_H] = max(x[P_H], 0.0)
     x[P_S] = max(x[P_S], 0.0)
     remember(x, p)
+    if seals.are:
+        x[BRISTLES] = _carried(_standing(x, p), seals, p)
     return h
+
+
+@compiled_in_place
+def _seals(x: Array, p: Any) -> _Seals:
+    if not terms.has_bristles(p):
+        return _Seals(False, 0.0, 0.0)
+    return _Seals(True, x[BRISTLES], _standing(x, p).joint_stroke)
+
+
+@compiled_in_place
+def _bristles(motion: _Motion, p: Any) -> bristles.Bristles:
+    return terms.bristles(motion.joint_velocity, motion.force, p)
+
+
+@compiled_in_place
+def _carried(motion: _Motion, seals: _Seals, p: Any) -> float:
+    """Return the force of the bristles, N, where the joint has come to inside a step."""
+    moved = motion.joint_stroke - seals.stroke
+    return bristles.carried(seals.force, moved, _bristles(motion, p))
 
 
 @compiled_in_place
@@ -404,33 +444,72 @@ def _cross(x: Array, h: float, p: Any, dx: Array) -> _Play:
 
 
 @compiled_in_place
-def _write_first_rates(
-    x: Array, command: float, allowed: _Allowed, p: Any, dx: Array
+def _write_first_rates(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, allowed: _Allowed, seals: _Seals, p: Any, dx: Array
 ) -> dry_friction.Friction:
     """Write dx/dt at the start of a step, but for play that is crossed; return its dry friction."""
-    n, left, usual = p.mode_joint.size, allowed.left, allowed.usual
+    left, usual = allowed.left, allowed.usual
     motion = _standing(x, p) if allowed.crossing else _motion(x, p)
+    if seals.are:
+        return _write_on_bristles(x, command, motion, allowed, seals, p, dx)
     _write_rates(x, command, motion, 0.0, p, dx)
     if not terms.has_dry_friction(p):
         return dry_friction.Friction(left, 0.0, False)
-    turning, admittance = 0.0, 0.0
-    for i in range(n):
-        turning += p.mode_joint[i] * dx[MODES + n + i]
-        admittance += p.mode_joint[i] * p.mode_joint[i]
     friction = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     piston = dry_friction.Piston(
         motion.joint_velocity,
-        motion.arm * turning,
-        motion.arm * motion.arm * admittance,
+        _acceleration(motion, dx, p),
+        _mobility(motion, p),
         _situation(motion),
         friction,
         _swing(x, dx, motion.arm, friction, p),
     )
-    fine = usual / FINER if usual <= STEP else usual
-    dry = dry_friction.over_step(piston, left, usual, fine, p)
-    for i in range(n):
-        dx[MODES + n + i] -= p.mode_joint[i] * motion.arm * dry.force
+    dry = dry_friction.over_step(piston, left, usual, _fine(usual, p), p)
+    for i in range(p.mode_joint.size):
+        dx[MODES + p.mode_joint.size + i] -= p.mode_joint[i] * motion.arm * dry.force
     return dry
+
+
+@compiled_in_place
+def _write_on_bristles(  # noqa: PLR0913, PLR0917 (as _advance)
+    x: Array, command: float, motion: _Motion, allowed: _Allowed, seals: _Seals, p: Any, dx: Array
+) -> dry_friction.Friction:
+    """Write dx/dt at the start of a step that follows the piston on the bristles of its seals."""
+    velocity, b = motion.joint_velocity, _bristles(motion, p)
+    friction = bristles.friction(seals.force, velocity, b)
+    _write_rates(x, command, motion, friction, p, dx)
+    holding = abs(bristles.bending(seals.force, math.copysign(1.0, velocity), b))
+    if velocity * (velocity + allowed.usual * _acceleration(motion, dx, p)) <= 0.0:
+        holding = 2.0  # it turns round
+    step = bristles.longest_step(holding, _mobility(motion, p), b)
+    return dry_friction.Friction(min(allowed.left, _fine(allowed.usual, p), step), friction, False)
+
+
+@compiled_in_place
+def _acceleration(motion: _Motion, dx: Array, p: Any) -> float:
+    """Return the piston's acceleration, m/s^2, at the rates dx."""
+    turning = 0.0
+    for i in range(p.mode_joint.size):
+        turning += p.mode_joint[i] * dx[MODES + p.mode_joint.size + i]
+    return motion.arm * turning
+
+
+@compiled_in_place
+def _mobility(motion: _Motion, p: Any) -> float:
+    """Return by how much a force on the piston accelerates it, 1/kg."""
+    admittance = 0.0
+    for i in range(p.mode_joint.size):
+        admittance += p.mode_joint[i] * p.mode_joint[i]
+    return motion.arm * motion.arm * admittance
+
+
+@compiled_in_place
+def _fine(usual: float, p: Any) -> float:
+    """Return the step, s, that follows stick and slip; the usual one where that is a coarse one."""
+    if usual > STEP:
+        return usual
+    fastest = math.sqrt(p.mode_stiffness[p.mode_joint.size - 1])
+    return min(usual, OF_FASTEST / fastest) / FINER
 
 
 @compiled_in_place
@@ -449,12 +528,21 @@ def _swing(x: Array, dx: Array, arm: float, friction: float, p: Any) -> float:
 
 @compiled_in_place
 def _write_later_rates(  # noqa: PLR0913, PLR0917 (as _advance)
-    x: Array, command: float, dry: dry_friction.Friction, play: _Play, p: Any, dx: Array
+    x: Array,
+    command: float,
+    dry: dry_friction.Friction,
+    play: _Play,
+    seals: _Seals,
+    p: Any,
+    dx: Array,
 ) -> None:
     """Write dx/dt at a later stage of a step under its dry friction and with its play."""
     motion = _crossing(_standing(x, p), play.rate) if play.held else _motion(x, p)
     force = dry.force
-    if not dry.held:
+    if seals.are:
+        carried = _carried(motion, seals, p)
+        force = bristles.friction(carried, motion.joint_velocity, _bristles(motion, p))
+    elif not dry.held:
         force = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     _write_rates(x, command, motion, force, p, dx)
 

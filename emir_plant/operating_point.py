@@ -12,7 +12,8 @@ from scipy.optimize import root
 
 from emir_plant import core
 from emir_plant.core import Array
-from emir_plant.effects import linkage_error
+from emir_plant.effects import linkage_error, terms
+from emir_plant.hydraulics import chambers
 from emir_plant.plant import Plant, SimulationError
 
 BAR = 1e5
@@ -101,4 +102,6 @@ def _state(plant: Plant, angle: float, unknown: Array, velocity: float, command:
     x[core.SPOOL], x[core.LOGIC] = command, 1.0
     rate = velocity / linkage_error.lever_arm(angle, p)
     x[core.MODES + p["mode_joint"].size] = rate / p["mode_joint"][0]
+    load = chambers.piston_force(x[core.P_H], x[core.P_S], p)
+    x[core.BRISTLES] = math.copysign(terms.bristles(velocity, load, p).sliding, velocity)
     return x

@@ -20,6 +20,7 @@ class Effect:
     stepwise: names of the sizes that act only beyond some value, and too much soon after: a search
         goes through them in steps of their trial values.
     none_or_above: values of fields below which they count as none.
+    other_law: fields that give the effect another law where they are not 0; a search begins at 0.
     is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """
 
@@ -30,6 +31,7 @@ class Effect:
     stepwise: ClassVar[tuple[str, ...]] = ()
     none_or_above: ClassVar[dict[str, float]] = {}
     is_series: ClassVar[bool] = False
+    other_law: ClassVar[tuple[str, ...]] = ()
 
     @property
     def is_on(self) -> bool:

@@ -13,17 +13,23 @@ from emir_plant.jit import compiled
 class CoulombFriction(Effect):
     """Force against the motion of the piston: F_c tanh(v / v_0).
 
-    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0).
+    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0). With
+    presliding it comes along the way instead, see `emir_plant.bristles`.
     """
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("force",)
     source: ClassVar[str] = "seal friction, 1-3 % of the load"
     trial: ClassVar[dict[str, float]] = {"force": 3e3, "gradual_share": 0.5}
+    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
 
     force: float = quantity("N", 0.0, 1e5, "F_c", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
+    presliding: float = quantity(
+        "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
+    )
+    presliding_time: float = quantity("s", 0.0, 0.1, "sigma_1 / sigma_0 on that way", default=0.0)
 
 
 @compiled

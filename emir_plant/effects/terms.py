@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_plant.bristles import Bristles
 from emir_plant.effects import (
     backlash,
     coulomb_friction,
@@ -68,6 +69,40 @@ def named_dry_friction(velocity: float, load: float, p: Any) -> float:
     """Return the part of `friction` that is steep near standstill, N."""
     dry = coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
     return dry + pressure_dependent_friction.friction(velocity, load, p)
+
+
+@compiled
+def bristles(velocity: float, load: float, p: Any) -> Bristles:
+    """Return the bristles of all seals; as for `friction`.
+
+    Each is as stiff as makes its friction, while sliding fast, over the way on which it gives.
+    """
+    pressed = p.pressure_dependent_friction_coefficient * abs(load)
+    coulomb = _over(p.coulomb_friction_force, p.coulomb_friction_presliding)
+    stribeck = _over(p.stribeck_friction_force, p.stribeck_friction_presliding)
+    by_load = _over(pressed, p.pressure_dependent_friction_presliding)
+    damping = coulomb * p.coulomb_friction_presliding_time
+    damping += stribeck * p.stribeck_friction_presliding_time
+    damping += by_load * p.pressure_dependent_friction_presliding_time
+    sliding = p.coulomb_friction_force + pressed
+    if p.stribeck_friction_force > 0.0:
+        sliding += stribeck_friction.level(velocity, p)
+    return Bristles(sliding, coulomb + stribeck + by_load, damping)
+
+
+@compiled
+def _over(force: float, way: float) -> float:
+    return force / way if way > 0.0 else 0.0
+
+
+@compiled
+def has_bristles(p: Any) -> bool:
+    """Tell whether dry friction comes along the way; not beside a curve, which is by velocity."""
+    way = p.coulomb_friction_force * p.coulomb_friction_presliding
+    way += p.stribeck_friction_force * p.stribeck_friction_presliding
+    pressed = p.pressure_dependent_friction_coefficient
+    way += pressed * p.pressure_dependent_friction_presliding
+    return way > 0.0 and p.unnamed_force_over == 0.0
 
 
 @compiled

@@ -9,7 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from emir_analysis.blind.boom import GRAVITY
-from emir_analysis.blind.hidden import Hidden, Random, Scale, between, boom_mass, either_sign
+from emir_analysis.blind.hidden import (
+    Hidden,
+    Random,
+    Scale,
+    between,
+    boom_mass,
+    either_sign,
+    lifting_force,
+)
 from emir_analysis.blind.machine import Array, Sizes
 from emir_analysis.blind.numbers import Numbers
 
@@ -326,6 +334,89 @@ class PlayOfMagnet(Hidden):
         return super().run(x, times, self._acting)
 
 
+class _OnBristles(Hidden):
+    """Seals that give before they slide, as LuGre's bristles do; a state is how far, in 10 um."""
+
+    def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
+        super().__init__(numbers, sizes)
+        self._bristle = self.slot()
+
+    def slides_at(self, velocity: float, x: Array) -> float:
+        """Return the friction, N, at which the seals slide."""
+        raise NotImplementedError
+
+    def stiffness_of_seals(self, x: Array) -> float:
+        """Return that of the bristles, N/m."""
+        raise NotImplementedError
+
+    def _bending(self, x: Array) -> tuple[float, float]:
+        angle, _, spin = self._rows @ x[self.modes]
+        velocity = self.lever_arm(angle) * spin
+        bent = 1e-5 * x[self._bristle]
+        furthest = self.slides_at(velocity, x) / self.stiffness_of_seals(x)
+        return bent, velocity - abs(velocity) * bent / furthest
+
+    def remembered_rates(self, time: float, x: list[float], now: dict[str, float]) -> list[float]:
+        _, rate = self._bending(np.array(x))
+        return [*super().remembered_rates(time, x, now), 1e5 * rate]
+
+    def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        bent, rate = self._bending(x)
+        held = self.stiffness_of_seals(x) * (bent + self.sizes["bristle_time"] * rate)
+        return super().accelerations(x, time, angle, push - held)
+
+    def start_memory(self, angle: float, x: list[float]) -> list[float]:
+        return [*super().start_memory(angle, x), 0.0]
+
+
+class StribeckOnBristles(_OnBristles):
+    """LuGre's friction with a break-away."""
+
+    name = "stribeck_friction~bristles"
+    grows = ("slides",)
+    scales: ClassVar[dict[str, Scale]] = {"slides": lifting_force}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "slides": between(random, 4e3, 1.5e4),
+            "breaks_away": random.uniform(1.2, 2.0),
+            "falls_at": between(random, 4e-3, 2e-2),
+            "gives": between(random, 1e-5, 1e-4),
+            "bristle_time": float(random.choice([0.0, 1.5e-3])),
+        }
+
+    def slides_at(self, velocity: float, x: Array) -> float:
+        s = self.sizes
+        hump = (s["breaks_away"] - 1.0) * math.exp(-((velocity / s["falls_at"]) ** 2))
+        return s["slides"] * (1.0 + hump)
+
+    def stiffness_of_seals(self, x: Array) -> float:
+        return self.sizes["slides"] / self.sizes["gives"]
+
+
+class LoadOnBristles(_OnBristles):
+    """Friction by the load, of seals that give."""
+
+    name = "pressure_dependent_friction~bristles"
+    grows = ("rubs",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "rubs": between(random, 0.01, 0.04),
+            "gives": between(random, 1e-5, 1e-4),
+            "bristle_time": 0.0,
+        }
+
+    def slides_at(self, velocity: float, x: Array) -> float:
+        force = x[0] * self.n.area_lifting - x[1] * self.n.area_lowering
+        return self.sizes["rubs"] * abs(float(force)) + 1.0
+
+    def stiffness_of_seals(self, x: Array) -> float:
+        return self.slides_at(0.0, x) / self.sizes["gives"]
+
+
 FOREIGN: tuple[type[Hidden], ...] = (
     TurbulentLeak,
     TurbulentDrip,
@@ -342,4 +433,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     OtherOil,
     SameSlope,
     PlayOfMagnet,
+    StribeckOnBristles,
+    LoadOnBristles,
 )

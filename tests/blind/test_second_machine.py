@@ -233,6 +233,26 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"magnet": 0.04},
         {"width": 0.04, "command_share": 1.0},
     ),
+    _OTHER["stribeck_friction~bristles"]: (
+        {
+            "slides": 1e4,
+            "breaks_away": 1.6,
+            "falls_at": 8e-3,
+            "gives": 5e-5,
+            "bristle_time": 1.5e-3,
+        },
+        {
+            "force": 1e4,
+            "breakaway": 1.6,
+            "stribeck_speed": 8e-3,
+            "presliding": 5e-5,
+            "presliding_time": 1.5e-3,
+        },
+    ),
+    _OTHER["pressure_dependent_friction~bristles"]: (
+        {"rubs": 0.03, "gives": 5e-5, "bristle_time": 0.0},
+        {"coefficient": 0.03, "presliding": 5e-5},
+    ),
 }
 
 

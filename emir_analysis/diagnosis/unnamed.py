@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
-from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW
+from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW, level
 from emir_analysis.diagnosis.candidates import (
     FREE_RUN_ACCURACY,
     GROWING,
@@ -38,6 +38,8 @@ from emir_analysis.diagnosis.select import (
     beyond,
     excess,
     free_run_score,
+    limits,
+    quiet,
     score,
 )
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
@@ -82,14 +84,18 @@ class Curves:
         """Return a trial that names no effects, and what is missing as a curve in its machine.
 
         beside: a trial fitted to the balances, whose effects stay in the machine. None where no
-        curve makes most of what they lack, or where with it the free run is not explained.
+        curve makes most of what they lack, or where with it the free run is not explained or a
+        balance still speaks.
         """
         balances = self._balances if beside is None else self._about(beside)
         best = balances.best(self._forms)
         if best is None or best.share < MEASURED_SHARE:
             return None
         found = _fitted(best.trial, self._evidence)
-        return found if excess(found, self._evidence) <= beyond(EXPLAINED) else None
+        if excess(found, self._evidence) > beyond(EXPLAINED):
+            return None
+        left = level(self._evidence.residuals([found.machine])[0])
+        return found if quiet(left, limits(found.machine, self._evidence)) else None
 
     def uneven(self, named: Trial) -> bool:
         """Tell whether friction that differs with the direction says the balances clearly better.

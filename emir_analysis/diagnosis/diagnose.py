@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
+from emir_analysis.diagnosis.telling import open_shares
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.diagnosis.where import Where, where
 from emir_analysis.diagnosis.whole import Progress
@@ -31,12 +32,12 @@ class Findings:
     verdict: nothing_missing, found, ambiguous or unexplained. balanced: parameters only, fitted to
     the balances, refitted: to the free run of the whole recordings, chosen: likewise, with the
     effects named. rejected: the trial whose effects were best among all and yet leave too much.
-    tried: all trials. rivals: those as good as the chosen one. residuals: (w, 5) of each balance
-    for the machine as stated (`before`), `refitted` and `after`; floor: (5,) the sensors' share,
-    limit: (5,) from which on a balance speaks. speaking: the balance that no effect takes down to
-    the noise, the loudest or that which swings with time, shape: of its residual, swing: how that
-    swings, where: most of it lies. curve: what has no name, with which `chosen` and `after` then
-    are.
+    tried: all trials. rivals: those as good as the chosen one, undecided: likewise, itself with a
+    share at the other end, by the share's path. residuals: (w, 5) of each balance for the machine
+    as stated (`before`), `refitted` and `after`; floor: (5,) the sensors' share, limit: (5,) from
+    which on a balance speaks. speaking: the balance that no effect takes down to the noise, the
+    loudest or that which swings with time, shape: of its residual, swing: how that swings, where:
+    most of it lies. curve: what has no name, with which `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -48,6 +49,7 @@ class Findings:
     rejected: Trial | None
     tried: tuple[Tried, ...]
     rivals: tuple[Trial, ...]
+    undecided: dict[str, Trial]
     residuals: dict[str, Array]
     floor: Array
     limit: Array
@@ -99,6 +101,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         rejected=rejected,
         tried=tuple(search.tried),
         rivals=tuple(best[1:]),
+        undecided=open_shares(final, evidence),
         residuals={"before": before, "refitted": unaided, "after": after},
         floor=floor,
         limit=limit,

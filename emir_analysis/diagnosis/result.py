@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
 from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK, PERIODS
 from emir_analysis.diagnosis.swing import Swing
-from emir_analysis.diagnosis.telling import between_steps, open_shares, untold
+from emir_analysis.diagnosis.telling import between_steps, untold
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.root_mean_square import column_rms
@@ -177,9 +177,7 @@ def diagnosis(
     return Diagnosis(
         verdict=verdict(findings, judged),
         statement=statement(findings, judged),
-        effects=effect_results(
-            findings.chosen, fitted, open_shares(findings.chosen, findings.evidence)
-        ),
+        effects=effect_results(findings.chosen, fitted, findings.undecided),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
         tell_apart=tell_apart(findings),
         candidates=_candidates(findings),
@@ -254,7 +252,7 @@ def confounded(paths: Sequence[str], covariance: Array) -> dict[str, tuple[str, 
 
 
 def effect_results(
-    chosen: Trial, fitted: dict[str, ParameterResult], undecided: frozenset[str] = frozenset()
+    chosen: Trial, fitted: dict[str, ParameterResult], undecided: Iterable[str] = ()
 ) -> tuple[EffectResult, ...]:
     """Return a trial's effects with their fitted parameters, and those that were fixed at the end.
 
@@ -264,12 +262,13 @@ def effect_results(
     for name in chosen.effects:
         kind = REGISTRY[name]
         effect = getattr(chosen.machine.effects, name)
+        usual = quantities(kind).keys() - {*kind.sizes, *kind.other_law}
         parameters = {}
         for parameter, about in quantities(kind).items():
             path = f"effects.{name}.{parameter}"
             if path in fitted:
                 parameters[parameter] = replace(fitted[path], meaning=about.meaning)
-            elif parameter not in kind.sizes or getattr(effect, parameter) != 0.0:
+            elif parameter in usual or getattr(effect, parameter) != 0.0:
                 value = float(getattr(effect, parameter))
                 low, high, note = value, value, SET
                 if path in undecided:

@@ -9,7 +9,6 @@ from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
-from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
@@ -83,14 +82,15 @@ def _of_findings(findings: Findings) -> str:
                     " course over time than those looked for"
                 )
     if findings.verdict == "unexplained":
-        known = "" if findings.rejected is None else _rejected(findings.rejected, findings.evidence)
+        known = "" if findings.rejected is None else _rejected(findings.rejected, findings)
         left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
         return known + left + of_stamps(findings.evidence.experiments)
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
     left = f"; {remainder}" if remainder else ""
-    return names + left + other_reasons(findings.chosen) + _unforeseeable(findings)
+    more = other_reasons(findings.chosen) + _undecided(findings) + _unforeseeable(findings)
+    return names + left + more
 
 
 def other_reasons(chosen: Trial) -> str:
@@ -106,6 +106,24 @@ def other_reasons(chosen: Trial) -> str:
     if late.min() > CLOCK and np.ptp(late) < ALIKE * late.max():
         return "; both pressures come equally late, as by another clock"
     return ""
+
+
+def _undecided(findings: Findings) -> str:
+    """Return which shares recordings leave open, and by which movement they would tell.
+
+    Where no movement tells, it does not matter.
+    """
+    words = ""
+    for path, other in findings.undecided.items():
+        about, value = declared(findings.chosen.machine)[path]
+        best, apart = movement([findings.chosen, other], findings.evidence)
+        if apart >= EXPLAINED:
+            share = path.removeprefix("effects.")
+            words += (
+                f"; whether {share} ({about.meaning}) is 0 or 1 the recording does not tell, and"
+                f" {value:.0f} is taken: in {best} they differ by {apart:.0f} times the noise"
+            )
+    return words
 
 
 def _from(findings: Findings) -> str:
@@ -262,10 +280,13 @@ def _ends(chosen: Trial) -> tuple[str, ...]:
     return tuple(u.path for u, x in together if u.at_end(float(x)) and not u.shapes)
 
 
-def _rejected(rejected: Trial, evidence: Evidence) -> str:
+def _rejected(rejected: Trial, findings: Findings) -> str:
     """Return what comes closest, how far it is off, and that what follows is said without it."""
-    left = math.sqrt(mean_square(rejected, evidence))
-    off = f" ({left:.1f} times the noise in the free run)" if math.isfinite(left) else ""
+    left, plain = (
+        math.sqrt(mean_square(trial, findings.evidence)) for trial in (rejected, findings.refitted)
+    )
+    off = f" ({left:.1f} times the noise in the free run, parameters alone {plain:.1f})"
+    off = off if math.isfinite(left + plain) else ""
     them = "them" if len(rejected.effects) > 1 else "it"
     return f"{closest(rejected)}{off}; without {them} "
 

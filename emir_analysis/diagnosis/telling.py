@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES
-from emir_analysis.diagnosis.candidates import Trial
+from emir_analysis.diagnosis.candidates import Trial, glimpsed
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
-from emir_analysis.diagnosis.select import STRONG, free_run_score
+from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.select import EXPLAINED, STRONG, beyond, excess, free_run_score
 from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
@@ -67,21 +68,27 @@ def untold(evidence: Evidence) -> dict[str, str]:
     return lines
 
 
-def open_shares(chosen: Trial, evidence: Evidence) -> frozenset[str]:
-    """Return shares that were set to none or all of it where the other end is as good.
+def open_shares(chosen: Trial, evidence: Evidence) -> dict[str, Trial]:
+    """Return the trials at the other end of shares that were set, where they are as good.
 
-    By dotted path. The other parameters are left as they are.
+    By the share's dotted path. The other parameters move with it where it explains nearly as well
+    without, but for what sticks: a step of the resolver decides there.
     """
     fitted = {unknown.path for unknown in chosen.unknowns.members}
-    score = free_run_score(chosen, evidence, seen=0.0)
-    found = set()
+    good = free_run_score(chosen, evidence, seen=0.0) + STRONG
+    found = {}
     for path, (_, value) in declared(chosen.machine).items():
         named = path.startswith(tuple(f"effects.{effect}." for effect in chosen.effects))
         if named and path not in fitted and is_share(path):
-            other = free_run_score(chosen.fixed(path, 1.0 - value), evidence, seen=0.0)
-            if other < score + STRONG:
-                found.add(path)
-    return frozenset(found)
+            other = chosen.fixed(path, 1.0 - value)
+            score = free_run_score(other, evidence, seen=0.0)
+            near = score >= good and excess(other, evidence) < beyond(EXPLAINED)
+            if near and not sticks(chosen):
+                other = glimpsed(other, evidence)
+                score = free_run_score(other, evidence, seen=0.0)
+            if score < good:
+                found[path] = other
+    return found
 
 
 def between_steps(chosen: Trial, k: int, evidence: Evidence) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from operated import moved
+from operated import moved, operated
 
 from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
@@ -34,12 +34,33 @@ def test_a_share_that_nothing_depends_on_is_not_determined() -> None:
     """On the rod no force is vertical nor about the joint, but that it is on the rod is told."""
     known, evidence = pushed()
     found = open_shares(known, evidence)
-    assert found == {LOAD + "vertical_share", LOAD + "joint_share"}
+    assert set(found) == {LOAD + "vertical_share", LOAD + "joint_share"}
     (effect,) = effect_results(known, {}, found)
     shown = {name: (p.low, p.high, p.note) for name, p in effect.parameters.items()}
     assert shown["vertical_share"] == (0.0, 1.0, OPEN)
     assert shown["piston_share"] == (1.0, 1.0, SET)
     assert OPEN in parameter_line("vertical_share", effect.parameters["vertical_share"], "1")
+
+
+PLAY = "effects.valve_hysteresis."
+RAMP = 0.5 * np.concatenate([np.linspace(0.0, 1.0, 30), np.ones(30), np.linspace(1.0, 0.0, 30)])
+JUMP = 0.5 * np.repeat([1.0, 0.0], 30)
+
+
+@pytest.mark.parametrize(("course", "open_"), [(RAMP, True), (JUMP, False)])
+def test_on_which_side_of_the_spool_play_is_jumps_alone_tell(
+    course: np.ndarray, *, open_: bool
+) -> None:
+    """A spool that overshoots leaves edges behind it where it came to; on a ramp it does not."""
+    rest = np.zeros(40)
+    command = np.concatenate([rest, course, rest, -course, rest])
+    stated = joint1()
+    hidden = {PLAY + "width": 0.03, PLAY + "command_share": 0.0}
+    evidence = Evidence([operated(with_values(stated, hidden), command)], stated)
+    begun = trial(Sheet(stated, {}, {}, ()), ("valve_hysteresis",)).fixed(PLAY + "command_share", 0)
+    (width,) = begun.unknowns.members
+    found = open_shares(begun.at(np.array([width.at(0.03)])), evidence)
+    assert (PLAY + "command_share" in found) == open_
 
 
 @pytest.mark.parametrize(("pressure", "told"), [(60e5, True), (-60e5, False)])

@@ -13,7 +13,7 @@ bending          measured minus modelled tip deflection under the measured force
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -69,6 +69,18 @@ FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of t
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 WINDOW_STEP = 0.25  # s, from one window to the next
 NOISE_DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
+
+
+def _by_velocity(records: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Return records of machines as one, (m,), whose dry friction all goes by the velocity.
+
+    A resolver's step is as long as the way on which seals give, or longer.
+    """
+    result = np.concatenate(records, dtype=records[0].dtype)
+    for name in result.dtype.names or ():
+        if name.endswith("_presliding"):
+            result[name] = 0.0
+    return result
 
 
 class Balances:
@@ -214,7 +226,7 @@ class Balances:
             experiment.commands[::stride],
             COMMAND_STEP * stride,
             np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
-            np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
+            _by_velocity([plants[k].record for k in able]),
         )
         return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
 

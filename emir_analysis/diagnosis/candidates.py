@@ -38,6 +38,8 @@ GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted 
 FREE_RUN_STEP = 3e-2  # as fit.DIFFERENCE_STEP, of a free run: sticking makes it rough
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
+SHORTEST_FOLLOWED, FOLLOWED_GROWTH = 5.0, 1.5  # s, and times, of a beginning that grows
+FOLLOWS = 1.15  # RMS error in units of the noise up to which a beginning is explained
 SETTLING = 5.0  # s from the start in which the state at rest is found
 RESTS = 21  # pressures at rest, from the least to the most, that are tried where none is shown
 
@@ -111,6 +113,12 @@ class Trial:
         less = self._less([path])
         machine = with_values(less.unknowns.machine, {path: value})
         return replace(less, unknowns=replace(less.unknowns, machine=machine))
+
+    def also(self, unknown: Unknown) -> "Trial":
+        """Return the trial with one parameter more to be fitted, begun at its start."""
+        members = Unknowns(self.unknowns.machine, (*self.unknowns.members, unknown))
+        covariance = np.pad(self.covariance, (0, 1), constant_values=np.nan)
+        return Trial(self.effects, members, np.append(self.x, unknown.start), covariance)
 
     def _less(self, paths: Sequence[str]) -> "Trial":
         kept = np.array([u.path not in paths for u in self.unknowns.members], dtype=bool)
@@ -253,6 +261,19 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     fine = replace(problem, start=near.x, coarse=None, step=DIFFERENCE_STEP)
     accuracy = FINE_ACCURACY if near.misfit <= POLISHED else FREE_RUN_ACCURACY
     return known.continued(fit(fine, accuracy))
+
+
+def following(known: Trial, evidence: Evidence) -> Trial:
+    """Fit a trial to the longest beginning of the free run that it explains; as it was, if none."""
+    end = max(float(e.time[-1]) for e in evidence.experiments)
+    time = SHORTEST_FOLLOWED
+    while time < end:
+        begin = evidence.until(time)
+        longer = refine_free_run(known, begin)
+        if mean_square(longer, begin) > FOLLOWS**2:
+            break
+        known, time = longer, FOLLOWED_GROWTH * time
+    return known
 
 
 def glimpsed(known: Trial, evidence: Evidence) -> Trial:

@@ -1,15 +1,22 @@
 """The laws of friction among the effects, from the fullest to the simplest."""
 
+import math
+
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
 from emir_plant.sheet import Sheet
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
+GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
+DAMPED = 1e-3  # s, by their damping, likewise
+LEAST_GIVE, MOST_GIVE = 1e-6, 3e-3  # m
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 
@@ -43,6 +50,36 @@ def gradual(known: Trial) -> Trial:
     for name in _dry(known):
         known = known.fixed(_share(name), 1.0)
     return known
+
+
+def along_the_way(known: Trial) -> Trial:
+    """Return a trial whose dry friction comes along the way in place of with the velocity.
+
+    The velocity at which it would turn round stays as it is. The balances go by that: no resolver
+    shows so short a way.
+    """
+    low, high = math.log(LEAST_GIVE / GIVE), math.log(MOST_GIVE / GIVE)
+    for name in _dry(known):
+        smoothing = f"effects.{name}.smoothing_speed"
+        speed = declared(known.machine)[smoothing][1]
+        known = known.fixed(smoothing, speed).fixed(_share(name), 0.0)
+        way = f"effects.{name}.presliding"
+        known = known.also(Unknown(way, "m", GIVE, 1.0, low, high, 0.0, False, logarithmic=True))
+        known = known.also(Unknown(f"{way}_time", "s", 0.0, DAMPED, 0.0, 50.0, 1.0, False))
+    return known
+
+
+def is_along_the_way(known: Trial) -> bool:
+    """Tell whether a trial's dry friction comes along the way."""
+    return any(getattr(known.machine.effects, name).presliding for name in _dry(known))
+
+
+def other_laws(known: Trial) -> list[Trial]:
+    """Return a trial with friction that comes gradually and along the way, what it does not do."""
+    if is_along_the_way(known):
+        return []
+    ways = [along_the_way(known)]
+    return ways if is_gradual(known) else [gradual(known), *ways]
 
 
 def is_gradual(known: Trial) -> bool:
@@ -93,6 +130,8 @@ def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
     values, others = full.unknowns.values(full.x), full.without(STRIBECK)
     found = trial(sheet, (*others.effects, COULOMB), others)
     found = found.fixed(_share(COULOMB), full.machine.effects.stribeck_friction.gradual_share)
+    if is_along_the_way(full):
+        found = along_the_way(found)
     x = found.x.copy()
     for k, unknown in enumerate(found.unknowns.members):
         if unknown.path.startswith(f"effects.{COULOMB}."):

@@ -27,6 +27,7 @@ SHAPES = {  # that are tried in all combinations
     "effects.stribeck_friction.breakaway": (1.15, 1.4, 1.7, 2.2),  # 1
     "effects.stribeck_friction.stribeck_speed": (2.5e-3, 5e-3, 1e-2, 2e-2),  # m/s
     "effects.stribeck_friction.smoothing_speed": (2e-4, 6e-4, 1.8e-3),  # m/s
+    "effects.stribeck_friction.presliding": (1e-5, 3e-5, 1e-4),  # m, in its place
 }
 INSIDE = 1e-6  # in units of an unknown, of its bounds, as the solver demands
 DRY = "effects.stribeck_friction.force"
@@ -55,7 +56,8 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
         return np.nan_to_num(evidence.in_noise(left, floor))
 
     paths = [unknown.path for unknown in start.unknowns.members]
-    shaping, dry, viscous = [paths.index(p) for p in SHAPES], paths.index(DRY), paths.index(VISCOUS)
+    shaping = [paths.index(path) for path in SHAPES if path in paths]
+    dry, viscous = paths.index(DRY), paths.index(VISCOUS)
     others = [k for k in range(len(paths)) if k not in (*shaping, dry, viscous)]
     shapes, size = _grid(start), np.eye(start.x.size)
     points = np.tile(start.x, (len(shapes), 1))
@@ -86,7 +88,8 @@ def _acting(start: Trial, others: list[int], missing: Callable[[Array], Array]) 
 def _grid(start: Trial) -> Array:
     """Return all shapes as the trial's unknowns, (m, 3)."""
     members = {unknown.path: unknown for unknown in start.unknowns.members}
-    levels = [[members[path].at(v) for v in values] for path, values in SHAPES.items()]
+    tried = {path: values for path, values in SHAPES.items() if path in members}
+    levels = [[members[path].at(v) for v in values] for path, values in tried.items()]
     return np.array(list(product(*levels)))
 
 

@@ -9,6 +9,7 @@ from emir_analysis.diagnosis.candidates import (
     Trial,
     fit_balances,
     fit_free_run,
+    following,
     free_run_errors,
     refine_free_run,
     trial,
@@ -34,7 +35,7 @@ from emir_analysis.diagnosis.select import (
     leaves_quiet,
     rivals,
 )
-from emir_analysis.diagnosis.stick_slip import begun, with_less_friction
+from emir_analysis.diagnosis.stick_slip import OFF, begun, with_less_friction
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
 from emir_plant.effects import REGISTRY
@@ -92,16 +93,26 @@ class Search:
         if np.all(left <= AT_NOISE) and self._quiet(self.balanced):
             self.tried = [self._scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
-        plain = self._scored(
-            fit_balances(self.balanced, self._head, self.floor),
-            free_run_score(self.refitted, self._evidence),
-        )
+        plain = self._scored(self._plain(), free_run_score(self.refitted, self._evidence))
         self.tried = [plain]
         best, equal, enough = self._one_at_a_time(plain)
+        if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
+            equal, best = self._by_beginning(equal, best, LEFT)
+            enough = self._enough(best.trial)
         if not enough:
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
         return equal if needed is equal[0] else self._rounds.get(needed.effects, [needed])
+
+    def _plain(self) -> Trial:
+        """Return the parameters alone as effects are looked for beside them.
+
+        As the balances have them. Where sensors leave all of these out, as the longest beginning
+        has them that they explain: what acts later cannot have led them astray.
+        """
+        if np.any(self._evidence.fitted):
+            return fit_balances(self.balanced, self._head, self.floor)
+        return following(self.balanced, self._head)
 
     def _one_at_a_time(self, plain: Tried) -> tuple[Tried, list[Trial], bool]:
         """Add effects to parameters alone, one a round, as long as that is better.
@@ -214,10 +225,13 @@ class Search:
         near = self._excess(best.trial) < beyond(HOPELESS)
         return replace(best, trial=self.whole.fitted(best.trial)) if near else best
 
-    def _by_beginning(self, equal: list[Trial], best: Tried) -> tuple[list[Trial], Tried]:
+    def _by_beginning(
+        self, equal: list[Trial], best: Tried, most: float = OFF
+    ) -> tuple[list[Trial], Tried]:
         """Return the best trials, one that sticks, with the friction that a beginning tells.
 
-        The same where they leave nothing, or where that is no better on the whole.
+        The same where they leave nothing, where more than most is left over that beginning, in
+        units of the noise, or where that is no better on the whole.
         """
         if self._excess(best.trial) <= beyond(LEFT):
             return equal, best
@@ -225,7 +239,7 @@ class Search:
         if led is not None:
             self.whole.keep(led)
             return equal, replace(best, trial=led)
-        found = self._with_friction(best.trial)
+        found = self._with_friction(best.trial, most)
         if found is None or self.whole.score(found) > self.whole.score(best.trial) - STRONG:
             return equal, best
         self.whole.keep(found)
@@ -234,7 +248,7 @@ class Search:
         self.tried.append(told)
         return [found], told
 
-    def _with_friction(self, known: Trial) -> Trial | None:
+    def _with_friction(self, known: Trial, most: float) -> Trial | None:
         """Return a trial that sticks with the friction that a beginning tells, fitted to the whole.
 
         None where that was asked before, tells that more than friction is missing, or is the same.
@@ -244,7 +258,7 @@ class Search:
             return None
         self._begun.add(start.effects)
         self._progress(f"friction by a growing beginning: {known.name}")
-        law = begun(start, self._evidence, self.floor)
+        law = begun(start, self._evidence, self.floor, most)
         if law is None:
             return None
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)

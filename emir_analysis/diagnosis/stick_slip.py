@@ -20,7 +20,9 @@ from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.friction_laws import (
     STRIBECK,
     VISCOUS,
-    gradual,
+    is_along_the_way,
+    is_gradual,
+    other_laws,
     simpler,
     viscous_is_heard,
 )
@@ -30,8 +32,8 @@ from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
-STARTS = 12  # from which the first beginning is fitted at a time ...
-TRIED = 24  # ... and in all, as long as none comes to the noise
+STARTS = 12  # from which the first beginning is fitted, and as many again where none comes to noise
+SMOOTH = 3  # the same where friction comes along the way: they lead to one minimum
 LED = (6, 3)  # of the best, along the next beginnings
 SAME_MINIMUM = 1.001  # ratio of the errors of two fits up to which they are the same minimum
 GROWTH = 1.5  # of a beginning from one to the next while several fits are led
@@ -54,25 +56,23 @@ ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest i
 Method = Callable[[Problem, float], Solution]
 
 
-def begun(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:
+def begun(start: Trial, evidence: Evidence, floor: Array, most: float = OFF) -> Trial | None:
     """Fit a trial to the free run of a beginning that grows to DECIDED.
 
     Over the first beginning it is fitted from those shapes of the friction near standstill whose
     free run is best there. The best fits are led on, fewer each time: it takes some sticks to
     tell two minima apart. Where that leaves more than LEFT, it is begun with friction that comes
-    gradually, too: fitted by tanh, that has led to another minimum. None where more than OFF is
-    left: that is no matter of how friction begins. floor: (5,) what the sensors leave in each
-    balance.
+    gradually, too, if no more than OFF is left (fitted by tanh, that has led to another minimum),
+    and with friction that comes along the way. None where more than `most` is left: that is no
+    matter of how friction begins. floor: (5,) what the sensors leave in each balance.
     """
-    found = _begun(start, evidence, floor)
-    if found.misfit > OFF:
-        return None
-    if found.misfit > LEFT:
-        slow = gradual(start)
-        other = _begun(slow, evidence, floor)
-        if other.misfit < found.misfit:
-            return slow.continued(other)
-    return start.continued(found)
+    best = start, _begun(start, evidence, floor)
+    for law in other_laws(start):
+        left = best[1].misfit
+        if left > LEFT and not (left > OFF and is_gradual(law)):
+            best = min(best, (law, _begun(law, evidence, floor)), key=lambda b: b[1].misfit)
+    law, found = best
+    return law.continued(found) if found.misfit <= most else None
 
 
 def _begun(start: Trial, evidence: Evidence, floor: Array) -> Solution:
@@ -84,9 +84,13 @@ def _begun(start: Trial, evidence: Evidence, floor: Array) -> Solution:
     time, first = FIRST, evidence.until(FIRST)
     points = [_at_rest(each, evidence) for each in starts]
     fits: list[Solution] = []
-    for k in range(0, TRIED, STARTS):
-        fits += [_fitted(start, first, x, ROUGH_ACCURACY) for x in points[k : k + STARTS]]
-        if min(each.misfit for each in fits) <= 1.0:
+    together = SMOOTH if is_along_the_way(start) else STARTS
+    for k in (0, together):
+        fits += [_fitted(start, first, x, ROUGH_ACCURACY) for x in points[k : k + together]]
+        least = min(each.misfit for each in fits)
+        if least > OFF:
+            return _distinct(fits)[0]
+        if least <= 1.0:
             break
     for count in LED:
         longer = GROWTH * time
@@ -187,13 +191,17 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     Where the machine sticks at other instants than the free run, a fit would not find back to
     them: of machines drawn from what the beginning before leaves open one goes on whose instants
     are the machine's (a particle filter's step, Gordon et al. 1993). Where even that leaves more
-    than before, the law is off, not one stick, and less is spent on it from there on.
+    than before, the law is off, not one stick, and less is spent on it from there on. Friction that
+    comes along the way lets a fit find back by itself.
     """
+    smooth = is_along_the_way(known)
     fitted, holds = _fitted(known, evidence.until(time), x, FREE_RUN_ACCURACY, method), True
     while time < end:
         holds = holds and fitted.misfit <= AT_NOISE
         growths = GROWTHS if holds else GROWTHS[:-1]
         longer = _followed(known, evidence, fitted, time, end, growths)
+        if longer == time and smooth:
+            longer = _longer(GROWTH * time, end)
         if longer > time:
             part = evidence.until(longer)
             accuracy = FREE_RUN_ACCURACY if longer == end else ROUGH_ACCURACY
@@ -250,6 +258,8 @@ def _found_again(
 
 def _begin(known: Trial, evidence: Evidence, fitted: Solution, time: float, longer: float) -> Array:
     """Return from where a fit to a longer beginning, s, begins, (k,)."""
+    if is_along_the_way(known):
+        return fitted.x
     if _followed(known, evidence, fitted, time, longer, (GROWTH,)) > time:
         return fitted.x
     return _drawn(known, evidence.until(longer), fitted, DRAWN_OF_EACH)

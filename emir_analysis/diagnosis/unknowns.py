@@ -140,7 +140,7 @@ class Unknowns:
 def unknowns(sheet: Sheet, effects: Sequence[str] = ()) -> Unknowns:
     """Return the sheet's toleranced parameters and all parameters of the named effects.
 
-    Without those of a stroke sensor that the machine does not have.
+    Without those of a stroke sensor that the machine does not have, and of another law.
     """
     stated = groups(sheet.machine)
     members = [_toleranced(stated, path, tol) for path, tol in sheet.tolerances.items()]
@@ -166,7 +166,7 @@ def _of_effect(effect: str, machine: Machine) -> list[Unknown]:
     stated = kind()
     members = []
     for name, about in quantities(kind).items():
-        if name == STROKE and not machine.sensors.own_stroke:
+        if name in kind.other_law or (name == STROKE and not machine.sensors.own_stroke):
             continue
         value = float(kind.trial.get(name, getattr(stated, name)))
         if name in kind.sizes:

@@ -19,8 +19,10 @@ from emir_analysis.diagnosis.candidates import (
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
+    along_the_way,
     breakaway_may_be_none,
     gradual,
+    is_along_the_way,
     is_gradual,
     sticks,
     viscous_is_heard,
@@ -28,7 +30,7 @@ from emir_analysis.diagnosis.friction_laws import (
 )
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT, STRONG, beyond, excess, free_run_score
-from emir_analysis.diagnosis.stick_slip import follows_the_beginning, grown
+from emir_analysis.diagnosis.stick_slip import Grown, follows_the_beginning, grown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
@@ -208,10 +210,20 @@ class Whole:
         """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
 
         A break-away may show in later sticks than those of the beginning, and whether friction
-        comes by tanh or gradually shows in many sticks only.
+        comes by tanh or gradually shows in many sticks only. Along the way that seals give only
+        where none by the velocity is at the noise.
         """
+        found = self._grown(law, fuller, rival)
+        if AT_NOISE < found.left < HOPELESS and not is_along_the_way(law):
+            ways = [along_the_way(each) for each in (law, *fuller)]
+            found = min(found, self._grown(ways[0], ways[1:], rival), key=lambda f: f.left)
+        return self._heard(found.trial)
+
+    def _grown(self, law: Trial, fuller: list[Trial], rival: Trial) -> Grown:
+        """Return the same by the velocity or along the way alone, as a law has it."""
         found = grown(law, self._evidence, rival)
-        if LEFT < found.left < HOPELESS and not is_gradual(law):
+        by_tanh = not is_gradual(law) and not is_along_the_way(law)
+        if LEFT < found.left < HOPELESS and by_tanh:
             other = grown(gradual(law), self._evidence, rival)
             if other.left < found.left:
                 found, fuller = other, [gradual(more) for more in fuller]
@@ -221,7 +233,7 @@ class Whole:
             led = grown(more, self._evidence, rival)
             if led.left <= AT_NOISE:
                 found = led
-        return self._heard(found.trial)
+        return found
 
     def _heard(self, led: Trial) -> Trial:
         """Return a trial without viscous friction that has become too small to be heard.

@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution
-from emir_analysis.diagnosis.friction_laws import fullest, is_gradual, nested
+from emir_analysis.diagnosis.friction_laws import fullest, is_along_the_way, is_gradual, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.select import at_noise
 from emir_analysis.diagnosis.stick_slip import FIRST, STARTS, begun, grown, with_less_friction
@@ -73,7 +73,29 @@ def test_friction_is_begun_beside_an_effect_at_the_edge_of_its_range() -> None:
     _, high = air.unknowns.bounds
     edge = fullest(air.at(np.where(air.unknowns.toleranced, 0.0, high)), sheet)
     found = friction_starts(edge, evidence, searched.floor, FIRST)
-    assert len(found) == math.prod(map(len, SHAPES.values()))
+    fitted = [unknown.path for unknown in edge.unknowns.members]
+    assert len(found) == math.prod(len(tried) for path, tried in SHAPES.items() if path in fitted)
+
+
+def test_seals_that_give_before_they_slide_are_found() -> None:
+    """Bristles of 60 um, damped: a law by the velocity leaves more than the noise in 10 s."""
+    hidden = HIDDEN | {
+        "effects.stribeck_friction.presliding": 6e-5,
+        "effects.stribeck_friction.presliding_time": 1.5e-3,
+        "effects.viscous_friction.coefficient": 0.0,
+    }
+    searched, sheet, evidence = search(hidden)
+    law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
+    assert is_along_the_way(law)
+    law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
+    fitted, left = grown(law, evidence)
+    assert left < 1.03
+    assert fitted.effects == ("stribeck_friction",)
+    stribeck = fitted.machine.effects.stribeck_friction
+    assert stribeck.force == pytest.approx(2e4, rel=0.03)
+    assert stribeck.breakaway == pytest.approx(1.6, rel=0.03)
+    assert stribeck.presliding == pytest.approx(6e-5, rel=0.1)
+    assert stribeck.presliding_time == pytest.approx(1.5e-3, rel=0.3)
 
 
 def test_no_more_friction_stays_than_there_is() -> None:
@@ -126,7 +148,8 @@ def test_what_is_far_off_over_the_beginning_is_no_matter_of_friction(
 
     monkeypatch.setattr(stick_slip, "_begun", fitted)
     assert begun(start, evidence, searched.floor) is None
-    assert len(tried) == 1  # not gradually, either
+    assert len(tried) == 2  # along the way besides,
+    assert not any(is_gradual(law) for law in tried)  # not gradually
 
 
 def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_f
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
 DAMPED = 1e-3  # s, by their damping, likewise
-LEAST_GIVE, MOST_GIVE = 1e-6, 3e-3  # m
+LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 

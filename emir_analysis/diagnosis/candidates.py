@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, Solution, fit, mean_squares
+from emir_analysis.diagnosis.fit import (
+    DIFFERENCE_STEP,
+    Problem,
+    Solution,
+    covariance,
+    fit,
+    mean_squares,
+)
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
@@ -39,7 +46,7 @@ FREE_RUN_STEP = 3e-2  # as fit.DIFFERENCE_STEP, of a free run: sticking makes it
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 SHORTEST_FOLLOWED, FOLLOWED_GROWTH = 5.0, 1.5  # s, and times, of a beginning that grows
-FOLLOWS = 1.15  # RMS error in units of the noise up to which a beginning is explained
+BEGINNING_EXPLAINED = 1.15  # RMS error in units of the noise, the most
 SETTLING = 5.0  # s from the start in which the state at rest is found
 RESTS = 21  # pressures at rest, from the least to the most, that are tried where none is shown
 
@@ -263,6 +270,13 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     return known.continued(fit(fine, accuracy))
 
 
+def with_spread(known: Trial, evidence: Evidence) -> Trial:
+    """Return a trial fitted to the whole with the covariance that short steps tell."""
+    problem = _whole_problem(known, evidence)
+    k = known.x.size
+    return replace(known, covariance=covariance(problem)[:k, :k])
+
+
 def following(known: Trial, evidence: Evidence) -> Trial:
     """Fit a trial to the longest beginning of the free run that it explains; as it was, if none."""
     end = max(float(e.time[-1]) for e in evidence.experiments)
@@ -270,7 +284,7 @@ def following(known: Trial, evidence: Evidence) -> Trial:
     while time < end:
         begin = evidence.until(time)
         longer = refine_free_run(known, begin)
-        if mean_square(longer, begin) > FOLLOWS**2:
+        if mean_square(longer, begin) > BEGINNING_EXPLAINED**2:
             break
         known, time = longer, FOLLOWED_GROWTH * time
     return known

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial, fit_balances
+from emir_analysis.diagnosis.candidates import Trial, fit_balances, with_spread
 from emir_analysis.diagnosis.curves import Curve, curve
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -84,6 +84,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     elif verdict == "unexplained":
         rejected = final if final.effects else None
         final, after = refitted, unaided
+    if verdict != "unexplained" and not sticks(final):  # whose free run is rough
+        final = with_spread(final, evidence)
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     lies = None if speaking is None else _where(evidence, after, floor, speaking)

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 
 from emir_analysis.signals import Array
 
+STRAIGHT_STEP = 1e-6  # as DIFFERENCE_STEP, where no fit has to get anywhere by them
 DIFFERENCE_STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
@@ -115,6 +116,18 @@ def fit(
         math.sqrt(2.0 * result.cost / result.fun.size),
         slopes.T @ slopes,
     )
+
+
+def covariance(problem: Problem) -> Array:
+    """Return the covariance, (k, k), of parameters that were fitted, from slopes at the start.
+
+    Over steps so short that they are straight: where two parameters do the same, such as a hose
+    and the volume it is connected to, slopes that bend by different amounts would seem to part
+    them.
+    """
+    held = _Held(replace(problem, coarse=None, step=STRAIGHT_STEP), problem.start)
+    residuals, slopes = held.slopes(problem.start)
+    return held.covariance(slopes, residuals)
 
 
 def descended(problem: Problem, accuracy: float) -> Solution:

@@ -15,8 +15,8 @@ from emir_plant.sheet import Sheet
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
-DAMPED = 1e-3  # s, by their damping, likewise
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
+DAMPED, MOST_DAMPED = 1e-3, 0.05  # s, by their damping: where a fit begins, and the most
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 
@@ -59,13 +59,14 @@ def along_the_way(known: Trial) -> Trial:
     shows so short a way.
     """
     low, high = math.log(LEAST_GIVE / GIVE), math.log(MOST_GIVE / GIVE)
+    most = MOST_DAMPED / DAMPED
     for name in _dry(known):
         smoothing = f"effects.{name}.smoothing_speed"
         speed = declared(known.machine)[smoothing][1]
         known = known.fixed(smoothing, speed).fixed(_share(name), 0.0)
         way = f"effects.{name}.presliding"
         known = known.also(Unknown(way, "m", GIVE, 1.0, low, high, 0.0, False, logarithmic=True))
-        known = known.also(Unknown(f"{way}_time", "s", 0.0, DAMPED, 0.0, 50.0, 1.0, False))
+        known = known.also(Unknown(f"{way}_time", "s", 0.0, DAMPED, 0.0, most, 1.0, False))
     return known
 
 

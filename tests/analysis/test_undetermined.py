@@ -1,10 +1,12 @@
 """What a recording does not determine is said to be so, in place of an interval."""
 
+import math
+
 import numpy as np
 import pytest
 from operated import moved, operated
 
-from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_analysis.diagnosis.candidates import Trial, trial, with_spread
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.result import OPEN, SET, effect_results, parameter_line
 from emir_analysis.diagnosis.telling import between_steps, open_shares
@@ -40,6 +42,23 @@ def test_a_share_that_nothing_depends_on_is_not_determined() -> None:
     assert shown["vertical_share"] == (0.0, 1.0, OPEN)
     assert shown["piston_share"] == (1.0, 1.0, SET)
     assert OPEN in parameter_line("vertical_share", effect.parameters["vertical_share"], "1")
+
+
+def test_of_two_that_do_the_same_each_is_as_uncertain_as_the_maker_leaves_the_other() -> None:
+    """A hose of C and a dead volume V: no movement tells more than C + V / beta."""
+    stated, tolerance = joint1(), 0.1
+    hose, volume = "effects.vessel_compliance.lifting", "cylinder.volume_lifting_0"
+    evidence = Evidence([moved(with_values(stated, {hose: 5e-11}))], stated)
+    sheet = Sheet(stated, {volume: tolerance}, {}, ())
+    begun = trial(sheet, ("vessel_compliance",)).with_one_size("vessel_compliance", "lifting")
+    begun = begun.fixed("effects.vessel_compliance.wall_share", 0.0)
+    paths = [unknown.path for unknown in begun.unknowns.members]
+    at, x = paths.index(hose), begun.x.copy()
+    x[at] = begun.unknowns.members[at].at(5e-11)
+    known = with_spread(begun.at(x), evidence)
+    low, high = known.unknowns.members[at].deviation(float(x[at]), float(known.spread[at]))
+    of_volume = tolerance / math.sqrt(3.0) * stated.cylinder.volume_lifting_0
+    assert 0.5 * (high - low) == pytest.approx(of_volume / stated.cylinder.beta, rel=0.05)
 
 
 PLAY = "effects.valve_hysteresis."

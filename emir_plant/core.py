@@ -377,7 +377,8 @@ def _step(x: Array, command: float, allowed: _Allowed, p: Any, work: Array) -> f
     x[P_S] = max(x[P_S], 0.0)
     remember(x, p)
     if seals.are:
-        x[BRISTLES] = _carried(_standing(x, p), seals, p)
+        motion = _standing(x, p)
+        x[BRISTLES] = _carried(motion, seals, _bristles(motion, p))
     return h
 
 
@@ -394,10 +395,10 @@ def _bristles(motion: _Motion, p: Any) -> bristles.Bristles:
 
 
 @compiled_in_place
-def _carried(motion: _Motion, seals: _Seals, p: Any) -> float:
+def _carried(motion: _Motion, seals: _Seals, b: bristles.Bristles) -> float:
     """Return the force of the bristles, N, where the joint has come to inside a step."""
     moved = motion.joint_stroke - seals.stroke
-    return bristles.carried(seals.force, moved, _bristles(motion, p))
+    return bristles.carried(seals.force, moved, b)
 
 
 @compiled_in_place
@@ -540,8 +541,8 @@ def _write_later_rates(  # noqa: PLR0913, PLR0917 (as _advance)
     motion = _crossing(_standing(x, p), play.rate) if play.held else _motion(x, p)
     force = dry.force
     if seals.are:
-        carried = _carried(motion, seals, p)
-        force = bristles.friction(carried, motion.joint_velocity, _bristles(motion, p))
+        b = _bristles(motion, p)
+        force = bristles.friction(_carried(motion, seals, b), motion.joint_velocity, b)
     elif not dry.held:
         force = terms.dry_friction(motion.joint_velocity, _situation(motion), p)
     _write_rates(x, command, motion, force, p, dx)

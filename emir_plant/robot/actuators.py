@@ -81,10 +81,11 @@ def _check_effects(effects: Effects, allowed: tuple[str, ...], where: str) -> No
                 f"{where}effects.{name}: not in the model of the whole robot; there are"
                 f" {', '.join(allowed)}"
             )
-        if getattr(effect, "presliding", 0.0):
-            raise ParameterError(
-                f"{where}effects.{name}.presliding: not in the model of the whole robot"
-            )
+        for field in effect.other_law:  # these need a memory of their own
+            if getattr(effect, field):
+                raise ParameterError(
+                    f"{where}effects.{name}.{field}: not in the model of the whole robot"
+                )
 
 
 def records(robot: Robot, reaches: tuple[Reach, ...]) -> NDArray[Any]:

@@ -411,7 +411,7 @@ class LoadOnBristles(_OnBristles):
 
     def slides_at(self, velocity: float, x: Array) -> float:
         force = x[0] * self.n.area_lifting - x[1] * self.n.area_lowering
-        return self.sizes["rubs"] * abs(float(force)) + 1.0
+        return self.sizes["rubs"] * abs(float(force)) + 1.0  # N, never 0: it is divided by
 
     def stiffness_of_seals(self, x: Array) -> float:
         return self.slides_at(0.0, x) / self.sizes["gives"]

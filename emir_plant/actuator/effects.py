@@ -2,7 +2,7 @@
 
 `REGISTRY` has those that have a name: each is off by default, a search tries them all. Names are
 those of the boom's effects where the physics is the same. A flow counts as lifting where it raises
-the pressure. The terms stand in `model.py`.
+the pressure. The terms stand in `equations.py`.
 """
 
 from dataclasses import dataclass

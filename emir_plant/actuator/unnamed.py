@@ -22,7 +22,7 @@ class Curve(Effect):
 
     over: the signal. what: stands for the points. low, high: of the signal, in its unit, the first
     and the last of evenly spaced places. points: the values there, a flow or a force as the
-    actuator has them (`model.py`).
+    actuator has them (`equations.py`).
     """
 
     sizes: ClassVar[tuple[str, ...]] = ("points",)

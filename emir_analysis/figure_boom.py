@@ -76,8 +76,7 @@ def _bending(plant: Plant, state: Array) -> Array:
 
 
 def _line(rotations: Array, geometry: Geometry) -> Array:
-    length = geometry.boom_length / rotations.size
-    return np.concatenate(([0.0], np.cumsum(length * rotations)))
+    return np.concatenate(([0.0], np.cumsum(geometry.section_length * rotations)))
 
 
 def picture(found: Deflections) -> Figure:

@@ -56,8 +56,7 @@ class BoomModes:
 
 def section_model(geometry: Geometry) -> SectionModel:
     """Assemble mass, stiffness and gravity of the section chain (paper Fig. 2)."""
-    sections = geometry.arms * geometry.sections_per_arm
-    length = geometry.boom_length / sections
+    sections, length = geometry.sections, geometry.section_length
     mass = geometry.boom_mass / sections
     centres = length * (np.tril(np.ones((sections, sections)), -1) + 0.5 * np.eye(sections))
     tip = np.full(sections, length)
@@ -77,7 +76,7 @@ def section_model(geometry: Geometry) -> SectionModel:
 
 def rigid_arm_joints(geometry: Geometry) -> Array:
     """Return (sections, n): the last section of an arm turns with the first of the next."""
-    sections = geometry.arms * geometry.sections_per_arm
+    sections = geometry.sections
     starts_arm = np.arange(sections) % geometry.sections_per_arm == 0
     coordinate = np.arange(sections) - np.cumsum(starts_arm) + 1
     join = np.zeros((sections, coordinate[-1] + 1))

@@ -19,7 +19,7 @@ def boom_urdf(geometry: Geometry, name: str = "emir_joint1") -> str:
     """Return the description: joint1, then bend1 ... between the sections of an arm."""
     root = ET.Element("robot", name=name)
     ET.SubElement(root, "link", name=ROOT)
-    length = geometry.boom_length / (geometry.arms * geometry.sections_per_arm)
+    length = geometry.section_length
     parent = ROOT
     for k, (joint, moves) in enumerate(_joints(geometry)):
         link = f"section{k + 1}"

@@ -39,6 +39,16 @@ class Geometry:
     modal_frequency: float = quantity("1", 0.5, 2.0, "factor on bending frequencies", default=1.0)
     payload: float = quantity("kg", 0.0, 3000.0, "point mass at the TCP", default=0.0)
 
+    @property
+    def sections(self) -> int:
+        """How many rigid sections the boom has."""
+        return self.arms * self.sections_per_arm
+
+    @property
+    def section_length(self) -> float:
+        """Of each section, m."""
+        return self.boom_length / self.sections
+
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder:
@@ -143,6 +153,11 @@ class Machine:
     unnamed_compliance: UnnamedCompliance = UnnamedCompliance()
     effects: Effects = field(default_factory=Effects)
 
+    @property
+    def payload(self) -> float:
+        """The mass at the TCP, kg: the stated payload and that of the effect."""
+        return self.geometry.payload + self.effects.payload.mass
+
     def __post_init__(self) -> None:
         for path, group in groups(self).items():
             check_ranges(group, path + ".")
@@ -156,10 +171,10 @@ class Machine:
 
 def cautions(machine: Machine) -> list[str]:
     """Return a line for each value that is allowed but beyond what the machine is made for."""
-    load = machine.geometry.payload + machine.effects.payload.mass
-    if load <= RATED_PAYLOAD:
+    if machine.payload <= RATED_PAYLOAD:
         return []
-    return [f"warning: payload = {load:g} kg: the machine is made for {RATED_PAYLOAD:g} kg"]
+    rated = f"the machine is made for {RATED_PAYLOAD:g} kg"
+    return [f"warning: payload = {machine.payload:g} kg: {rated}"]
 
 
 def groups(machine: Machine) -> dict[str, Any]:

@@ -55,8 +55,7 @@ def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
 
 def _with_effects(machine: Machine) -> Geometry:
     """Return the geometry with those effects in it that change a parameter of the boom."""
-    payload = machine.geometry.payload + machine.effects.payload.mass
-    return dataclasses.replace(machine.geometry, payload=payload)
+    return dataclasses.replace(machine.geometry, payload=machine.payload)
 
 
 def _parameters(machine: Machine) -> dict[str, Any]:

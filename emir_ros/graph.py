@@ -167,8 +167,7 @@ def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[st
         start = RobotTrajectoryInputs(with_values(Start(), angles).initial_angles.angles)
         path = with_values(path_parameters(sheet), {"supply": main.supply.p0})
         if own.get("weigh", path.weigh):
-            load = main.geometry.payload + main.effects.payload.mass
-            path = with_values(path, {"arm.payload": load})
+            path = with_values(path, {"arm.payload": main.payload})
     with _told_by(plan, "trajectory_node", own):
         of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
         move = with_values(TrajectoryParameters(), own)

@@ -76,7 +76,6 @@ class _Tree:
 def topology(robot: Robot) -> Topology:
     """Return the tree of the robot with its payload, payloads of effects included."""
     g, tree = robot.main.geometry, _Tree()
-    length = g.boom_length / (g.arms * g.sections_per_arm)
     carrier = tree.joint(0, pin.JointModelRZ(), np.zeros(3), "base")
     tree.body(carrier, _column(robot), "column")
     joints, cuts, linkages = [carrier], [], []
@@ -88,9 +87,9 @@ def topology(robot: Robot) -> Topology:
             carrier, pin.JointModelRevoluteUnaligned(LIFTING), place, f"joint{number}"
         )
         joints.append(carrier)
-        section = _section(robot, number, length)
+        section = _section(robot, number)
         tree.body(carrier, section, name)
-        place = np.array([length, 0.0, 0.0])
+        place = np.array([g.section_length, 0.0, 0.0])
         for k in range(2, g.sections_per_arm + 1):
             name = f"arm{number}_section{k}"
             shift = tree.joint(carrier, pin.JointModelTranslation(), place, f"{name}_shift")
@@ -153,8 +152,7 @@ def _linkage(
 
 
 def _load(tree: _Tree, carrier: int, place: NDArray[np.float64], robot: Robot) -> None:
-    mass = robot.main.geometry.payload + robot.main.effects.payload.mass
-    load = pin.Inertia(mass, np.zeros(3), np.zeros((3, 3)))
+    load = pin.Inertia(robot.main.payload, np.zeros(3), np.zeros((3, 3)))
     tree.model.appendBodyToJoint(carrier, load, pin.SE3(np.eye(3), place))
     tree.frame(carrier, place, TCP, pin.FrameType.OP_FRAME)
 
@@ -169,10 +167,10 @@ def _column(robot: Robot) -> Any:
     return pin.Inertia(base.column_mass, centre, base.column_inertia * np.eye(3))
 
 
-def _section(robot: Robot, number: int, length: float) -> Any:
+def _section(robot: Robot, number: int) -> Any:
     """Return a section's inertia: its mass spread along the box's walls."""
     mass = robot.structure_masses[number - 1] / robot.main.geometry.sections_per_arm
-    shape = box(robot.arm)
+    shape, length = box(robot.arm), robot.main.geometry.section_length
     about_y, about_z = shape.bending_vertical / shape.area, shape.bending_lateral / shape.area
     slender = length**2 / 12.0
     inertia = mass * np.diag([about_y + about_z, slender + about_y, slender + about_z])

@@ -144,8 +144,8 @@ def _box(mechanics: Mechanics, name: str) -> tuple[Array, Array]:
         height = max(machine.base.height, 0.1)
         return np.array([0.6, 0.6, height]), np.array([0.0, 0.0, 0.5 * height])
     if name.startswith("arm"):
-        length = g.boom_length / (g.arms * g.sections_per_arm)
-        return np.array([length, machine.arm.width, machine.arm.height]), _ahead(length)
+        size = np.array([g.section_length, machine.arm.width, machine.arm.height])
+        return size, _ahead(g.section_length)
     number, part = int(name[len("joint")]), name.split("_", 1)[1]
     parts, shape = machine.parts[number - 1], machine.linkages[number - 1]
     length, thick = {

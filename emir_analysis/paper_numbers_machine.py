@@ -274,9 +274,8 @@ def _dampings(responses: list[Response]) -> str:
 
 
 def _resolver(machine: Machine) -> Number:
-    s = machine.sensors
     angles = FORTY_FIVE + np.linspace(0.0, 0.02, 2001)
-    shown = np.unique([resolver(float(a), s.resolver_bits, s.resolver_span) for a in angles])
+    shown = np.unique([resolver(float(a), machine.sensors.resolver_step) for a in angles])
     step = float(np.diff(shown).min())
     arm = float(linkage.lever_arm(FORTY_FIVE, Plant(machine).record[0]))
     bits, tcp = math.log2(2.0 * math.pi / step), step * machine.geometry.boom_length

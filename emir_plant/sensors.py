@@ -56,9 +56,8 @@ _LATE = {
 }
 
 
-def resolver(angle: float, bits: int, span: float) -> float:
-    """Return the angle, rad, rounded to the nearest of 2^bits steps of the span, rad."""
-    step = span / 2.0**bits
+def resolver(angle: float, step: float) -> float:
+    """Return the angle, rad, rounded to the nearest of a resolver's steps, rad."""
     return math.floor(angle / step + 0.5) * step
 
 
@@ -88,7 +87,7 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
             lagging = float(state[index])
             true[name] = sensor_delay.shown(true[name], lagging, delay, late.dead_share)
     shown = {name: _distorted(value, name, machine) for name, value in true.items()}
-    angle = resolver(shown["angle"], sensors.resolver_bits, sensors.resolver_span)
+    angle = resolver(shown["angle"], sensors.resolver_step)
     lifting = shown["pressure_lifting"] + sensors.pressure_noise * noise[0]
     lowering = shown["pressure_lowering"] + sensors.pressure_noise * noise[1]
     return Measurement(

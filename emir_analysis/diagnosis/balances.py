@@ -359,9 +359,7 @@ def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0
     """Return the experiment as the machine's sensors show ideal readings, (n, 5) as SHOWN."""
     sensors = machine.sensors
     p = Plant(machine).record[0]
-    angle = np.array(
-        [resolver(a, sensors.resolver_bits, sensors.resolver_span) for a in ideal[:, ANGLE_COLUMN]]
-    )
+    angle = np.array([resolver(a, sensors.resolver_step) for a in ideal[:, ANGLE_COLUMN]])
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
     stroke = ideal[:, STROKE_COLUMN] if sensors.own_stroke else linkage.strokes(angle, p)

@@ -15,8 +15,8 @@ TRUTH = PLANT.outputs(PLANT.initial(math.radians(45.0), 20e5))
 
 def test_resolver_has_4096_steps_a_turn() -> None:
     angles = np.linspace(0.0, 2.0 * math.pi, 100_000, endpoint=False)
-    shown = np.array([resolver(a, 12, 2.0 * math.pi) for a in angles])
     step = 2.0 * math.pi / 4096
+    shown = np.array([resolver(a, PLANT.machine.sensors.resolver_step) for a in angles])
     assert np.unique(np.round(shown / step)).size == 4097  # both ends of the turn
     assert np.abs(shown - angles).max() <= step / 2 * (1 + 1e-9)
     # one step moves the TCP by 34.5 mm

@@ -60,6 +60,28 @@ class Plant:
                 f" {math.degrees(lowest):.1f} ... {math.degrees(highest):.1f} deg"
             )
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
+        position, force = self._resting(angle)
+        high = (force + low * p["area_lowering"]) / p["area_lifting"]
+        if not 0.0 <= high <= p["p0"]:
+            raise SimulationError(
+                f"at {math.degrees(angle):.1f} deg the boom needs {high / 1e5:.0f} bar to rest on,"
+                f" the pump gives 0 ... {p['p0'] / 1e5:.0f}"
+            )
+        x = np.zeros(core.MODES + 2 * position.size)
+        x[core.P_H], x[core.P_S] = high, low
+        pilot = logic_block.pilot_pressure(high, low, p)
+        x[core.LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
+        x[core.OFFSET] = backlash.flank(force, p)
+        x[core.DELAY_LINE : core.MODES] = command_delay.empty_line()
+        x[core.MODES : core.MODES + position.size] = position
+        x[core.LATE_ANGLE], x[core.LATE_P_H], x[core.LATE_P_S] = angle, high, low
+        x[core.LATE_STROKE] = linkage_error.stroke(angle, p) + x[core.OFFSET]
+        x[core.LATE_DEFLECTION] = p["mode_tip_angle"] @ position - angle
+        return x
+
+    def _resting(self, angle: float) -> tuple[Array, float]:
+        """Return the modal coordinates at rest at a boom angle, rad, and the oil's force, N."""
+        p = self.record[0]
         outside = external_load.force(0.0, p)
         load = p["mode_weight"] * math.cos(angle)
         load -= p["mode_tip"] * external_load.at_tip(outside, angle, p)
@@ -67,27 +89,11 @@ class Plant:
         needed = torque - external_load.about_joint(outside, p)
         force = needed / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
         force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)
-        high = (force + low * p["area_lowering"]) / p["area_lifting"]
-        if not 0.0 <= high <= p["p0"]:
-            raise SimulationError(
-                f"at {math.degrees(angle):.1f} deg the boom needs {high / 1e5:.0f} bar to rest on,"
-                f" the pump gives 0 ... {p['p0'] / 1e5:.0f}"
-            )
-        modes = p["mode_joint"].size
-        x = np.zeros(core.MODES + 2 * modes)
-        x[core.P_H], x[core.P_S] = high, low
-        pilot = logic_block.pilot_pressure(high, low, p)
-        x[core.LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
-        x[core.OFFSET] = backlash.flank(force, p)
-        x[core.DELAY_LINE : core.MODES] = command_delay.empty_line()
-        position = x[core.MODES : core.MODES + modes]
         bent = p["mode_joint"] * torque - load
+        position = np.zeros_like(load)
         position[1:] = bent[1:] / p["mode_stiffness"][1:]
         position[0] = (angle - p["mode_joint"][1:] @ position[1:]) / p["mode_joint"][0]
-        x[core.LATE_ANGLE], x[core.LATE_P_H], x[core.LATE_P_S] = angle, high, low
-        x[core.LATE_STROKE] = linkage_error.stroke(angle, p) + x[core.OFFSET]
-        x[core.LATE_DEFLECTION] = p["mode_tip_angle"] @ position - angle
-        return x
+        return position, float(force)
 
     def derivative(self, state: Array, command: float) -> Array:
         """Return dx/dt, same shape as the state, with a command that has arrived at the valve."""

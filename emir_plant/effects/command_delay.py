@@ -38,6 +38,7 @@ class CommandDelay(Effect):
     delay: float = quantity("s", 0.0, 0.2, "T", default=0.0)
 
 
+@compiled
 def empty_line() -> Array:
     """Return a delay line, (SIZE,), of a command that was 0 until now, t = 0."""
     line = np.zeros(SIZE)
@@ -83,8 +84,7 @@ def delayed(commands: Array, dt: float, parameters: NDArray[Any]) -> Array:
     dt is at most the integration step; the sequence starts the run.
     """
     p = parameters[0]
-    line = np.zeros(SIZE)
-    line[TIMES:INTEGRALS] = LONG_AGO
+    line = empty_line()
     result = np.empty_like(commands)
     for k in range(commands.size):
         result[k] = arriving(line, commands[k], k * dt, dt, p)

@@ -142,6 +142,12 @@ def _valve_sized(main: Machine, flow: float, values: dict[str, float], effects: 
 
 
 @compiled
+def own(x: Array, k: int) -> Array:
+    """Return a view, (5,), of the states of actuator k in those of all, x."""
+    return x[1 + k * EACH : 1 + (k + 1) * EACH]
+
+
+@compiled
 def _valve_flows(x: Array, supply: float, p: Any) -> tuple[float, float, float]:
     """Return the flows Q_H and Q_S through the valve and the pump's part of them, m^3/s."""
     edges = terms.edges(valve.opening(x[SPOOL], p), 0.0, 0.0, p)
@@ -188,10 +194,9 @@ def write_rates(
     """
     drawn = 0.0
     for k in range(ACTUATORS):
-        own = slice(1 + k * EACH, 1 + (k + 1) * EACH)
         stroke = motion[0, k] if k > 0 else 0.0  # the motor's chambers keep their volume
-        moving = (stroke, motion[1, k])
-        drawn += _write_actuator(x[own], commands[k], x[SUPPLY], moving, actuators[k], dx[own])
+        moving, p = (stroke, motion[1, k]), actuators[k]
+        drawn += _write_actuator(own(x, k), commands[k], x[SUPPLY], moving, p, own(dx, k))
     wanted = (pump[PRESSURE] - x[SUPPLY]) * pump[SLOPE]
     dx[SUPPLY] = (min(max(wanted, 0.0), pump[FLOW]) - drawn) * pump[STIFFNESS]
 
@@ -200,15 +205,15 @@ def write_rates(
 def limit(x: Array) -> None:
     """Keep the chambers' pressures from going below 0, in place: oil does not pull."""
     for k in range(ACTUATORS):
-        own = x[1 + k * EACH : 1 + (k + 1) * EACH]
-        own[P_H], own[P_S] = max(own[P_H], 0.0), max(own[P_S], 0.0)
+        each = own(x, k)
+        each[P_H], each[P_S] = max(each[P_H], 0.0), max(each[P_S], 0.0)
 
 
 @compiled
 def oil_force(x: Array, k: int, actuators: NDArray[Any]) -> float:
     """Return the oil's force on actuator k's piston, N; N m on the base."""
-    own = x[1 + k * EACH : 1 + (k + 1) * EACH]
-    return chambers.piston_force(own[P_H], own[P_S], actuators[k])
+    each = own(x, k)
+    return chambers.piston_force(each[P_H], each[P_S], actuators[k])
 
 
 @compiled
@@ -233,6 +238,5 @@ def friction_slope(velocity: float, load: float, p: Any) -> float:
 @compiled
 def flows_of(x: Array, k: int, actuators: NDArray[Any]) -> tuple[float, float]:
     """Return actuator k's flows through its valve into its chambers, m^3/s."""
-    own = x[1 + k * EACH : 1 + (k + 1) * EACH]
-    lifting, lowering, _ = _valve_flows(own, x[SUPPLY], actuators[k])
+    lifting, lowering, _ = _valve_flows(own(x, k), x[SUPPLY], actuators[k])
     return lifting, lowering

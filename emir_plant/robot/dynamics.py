@@ -109,11 +109,9 @@ class Mechanics:
 
     def mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return both at once, in one pass over the linkages."""
-        t, data = self.topology, self._data
-        z, rate, rest, slopes = self.expand(q, v)
-        tree = pin.rnea(t.model, data, z, rate, rest)
-        force = reduction.reduced_force(tree, t.independent, t.joints, t.parts, slopes)
-        tree = pin.crba(t.model, data, z, pin.Convention.WORLD)
+        t = self.topology
+        (z, slopes), force = self.posture_and_bias(q, v)
+        tree = pin.crba(t.model, self._data, z, pin.Convention.WORLD)
         return reduction.reduced_mass(tree, t.independent, t.joints, t.parts, slopes), force
 
     def acceleration(self, q: Array, v: Array, torques: Array) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant.jit import compiled
+from emir_plant.linkage import third_side
 
 Array = NDArray[np.float64]
 
@@ -99,9 +100,7 @@ def motion(angle: float, p: Any) -> Array:
 @compiled
 def cylinder_length(angle: float, p: Any) -> float:
     """Return the distance from cylinder foot to rod eye, m, at the joint angle, rad."""
-    theta = lever_direction(angle, p) - p.foot_direction
-    square = p.foot * p.foot + p.lever * p.lever
-    return math.sqrt(square - 2.0 * p.foot * p.lever * math.cos(theta))
+    return third_side(p.foot, p.lever, lever_direction(angle, p) - p.foot_direction)
 
 
 @compiled

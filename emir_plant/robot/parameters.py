@@ -4,11 +4,11 @@ The values stand in data/robot.yaml; what joint 1 shares with the main joint's o
 triangle, the boom's length, mass and bending springs, hydraulics, supply) in data/joint1.yaml.
 """
 
-import math
 from dataclasses import dataclass, field, fields
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_plant.effects import Effects
+from emir_plant.linkage import third_side
 from emir_plant.parameters import Machine
 
 JOINTS = 5  # horizontal ones; paper 2.1
@@ -200,8 +200,6 @@ class Robot:
 
     def _triangle(self) -> Linkage:
         g = self.main.geometry
-        square = g.triangle_a**2 + g.triangle_b**2
-        square -= 2.0 * g.triangle_a * g.triangle_b * math.cos(g.triangle_gamma0)
         return Linkage(
             foot=g.triangle_a,
             lever=g.triangle_b,
@@ -212,6 +210,6 @@ class Robot:
             ground_direction=0.0,
             arm_link_direction=0.0,
             assembly=1,
-            length_retracted=math.sqrt(square),
+            length_retracted=third_side(g.triangle_a, g.triangle_b, g.triangle_gamma0),
             stroke=self.joint1.stroke,
         )

@@ -14,7 +14,17 @@ from emir_plant.plant import SimulationError
 from emir_plant.robot import actuators, integration
 from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY
 from emir_plant.robot.dynamics import Mechanics
-from emir_plant.robot.integration import RATIO, STOP_FORCE, STROKE, VELOCITY, Tables
+from emir_plant.robot.integration import (
+    HIGHEST,
+    LOWEST,
+    RATIO,
+    STOP_DAMPING,
+    STOP_FORCE,
+    STOP_STIFFNESS,
+    STROKE,
+    VELOCITY,
+    Tables,
+)
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.posture import rest
 from emir_plant.robot.stiffness import cut_damping, cut_stiffness
@@ -67,9 +77,9 @@ class RobotPlant:
         """The end stops as the compiled functions read them, (4, 6)."""
         stop, reaches = self.robot.end_stop, self.mechanics.reaches
         table = np.zeros((4, ACTUATORS))
-        table[0, 1:] = [of.stroke_low for of in reaches]
-        table[1, 1:] = [of.stroke_high for of in reaches]
-        table[2], table[3] = stop.stiffness, stop.damping
+        table[LOWEST, 1:] = [of.stroke_low for of in reaches]
+        table[HIGHEST, 1:] = [of.stroke_high for of in reaches]
+        table[STOP_STIFFNESS], table[STOP_DAMPING] = stop.stiffness, stop.damping
         return table
 
     @cached_property
@@ -120,7 +130,7 @@ class RobotPlant:
                     f"joint {k} needs {max(high, other) / 1e5:.0f} bar to rest on, "
                     f"the pump gives {supply.p0 / 1e5:.0f}"
                 )
-            own = x[1 + k * EACH : 1 + (k + 1) * EACH]
+            own = actuators.own(x, k)
             own[P_H], own[P_S] = high, other
             pilot = logic_block.pilot_pressure(high, other, p)
             own[LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0

@@ -6,7 +6,6 @@ those of joint 1 stand in its own file.
 
 import dataclasses
 from dataclasses import MISSING
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -14,7 +13,7 @@ from emir_common.quantity import ParameterError, quantities
 from emir_common.yaml_file import read_map
 from emir_plant.parameters import Machine
 from emir_plant.robot.parameters import Robot
-from emir_plant.sheet import EFFECTS, joint1, load_sheet
+from emir_plant.sheet import EFFECTS, data, joint1, load_sheet
 
 
 def robot(file: Path | None = None, main: Path | None = None) -> Robot:
@@ -23,8 +22,7 @@ def robot(file: Path | None = None, main: Path | None = None) -> Robot:
     Without them it is EMIR as the project states it (data/robot.yaml and data/joint1.yaml).
     Raises ParameterError as `load_robot` and `load_sheet`.
     """
-    own = file or Path(str(files("emir_plant") / "data" / "robot.yaml"))
-    return load_robot(own, load_sheet(main).machine if main else joint1())
+    return load_robot(file or data("robot.yaml"), load_sheet(main).machine if main else joint1())
 
 
 def load_robot(path: Path, main: Machine) -> Robot:

@@ -57,10 +57,8 @@ def weighed(arm: Arm, joints: Array, torques: Array) -> float:
     doubt = np.maximum(empty, LEAST_DOUBT * empty.max())
     for _ in range(ITERATIONS):  # the arm sags under what it carries
         now = carried(payload)
-        per_kg, missing = (
-            (carried(payload + UNIT) - now) / UNIT / doubt,
-            (torques[1:] - now) / doubt,
-        )
+        per_kg = (carried(payload + UNIT) - now) / UNIT / doubt
+        missing = (torques[1:] - now) / doubt
         payload = max(payload + float(per_kg @ missing / (per_kg @ per_kg)), 0.0)
     return payload
 

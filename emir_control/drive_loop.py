@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from emir_common.quantity import check_ranges, quantity
-from emir_control.actuator import LEAST_OPEN, Actuator, ActuatorParameters, Oil
+from emir_control.actuator import Actuator, ActuatorParameters, Oil
 from emir_control.filters import low_pass
 from emir_control.force_loop import ForceLoopOutputs
 from emir_control.limits import LimitParameters, limited, off_the_ends
@@ -96,7 +96,7 @@ class DriveLoop:
         wanted = allowed + rate / self.drive.stiffness(stroke) - feedback
         velocity = off_the_ends(wanted, stroke, 0.0, p.limits)
         logic = self.drive.next_logic(state.logic, inputs.pressure_lifting, dt)
-        oil = self._oil(inputs, velocity, max(logic, LEAST_OPEN))
+        oil = self._oil(inputs, velocity, logic).with_open_block()
         still = abs(velocity) < p.actuator.static.standstill
         opening = 0.0 if still else self.drive.opening(velocity, oil)
         within = velocity == wanted and allowed == inputs.velocity_command
@@ -111,8 +111,9 @@ class DriveLoop:
         The pump is taken to have the metering edge's drop to spare, so that one that gives more
         than stated does not open the valve wide.
         """
-        p, lifting, lowering = self.parameters.actuator, *inputs[3:]
+        p = self.parameters.actuator
         most = p.supply - p.balance
+        lifting, lowering = inputs.pressure_lifting, inputs.pressure_lowering
         if velocity > 0.0:
             return Oil(inputs.stroke, min(lifting, most), lowering, logic)
         return Oil(inputs.stroke, lifting, min(lowering, most), logic)

@@ -23,14 +23,19 @@ GRID = ("strokes", "payloads", "forces")  # of a schedule
 
 def default_file(output: str) -> Path:
     """Return the design that comes with the project, for `stroke` or `tip_angle`."""
-    return Path(str(files("emir_control") / "data" / f"pfc_{output}.yaml"))
+    return _own(f"pfc_{output}.yaml")
 
 
 def find(name: str, output: str) -> Path:
     """Return the file of a design: a path, `scheduled` or nothing for those of the project."""
     if name == SCHEDULED:
-        return Path(str(files("emir_control") / "data" / f"pfc_{output}_{SCHEDULED}.yaml"))
+        return _own(f"pfc_{output}_{SCHEDULED}.yaml")
     return Path(name) if name else default_file(output)
+
+
+def _own(name: str) -> Path:
+    """Return a file that comes with the project."""
+    return Path(str(files("emir_control") / "data" / name))
 
 
 def load(file: Path, output: str) -> PfcParameters:
@@ -62,9 +67,7 @@ def save(file: Path, parameters: PfcParameters, output: str, made_by: Mapping[st
         raise ParameterError(f"{file}: {error.strerror}") from None
 
 
-def _parameters(content: Any, output: str) -> PfcParameters:
-    if not isinstance(content, dict):
-        raise ParameterError("no design in it")
+def _parameters(content: dict[Any, Any], output: str) -> PfcParameters:
     tuning = dict(_group(content, "tuning", {f.name for f in dataclasses.fields(PfcParameters)}))
     for name, about in quantities(PfcParameters).items():
         if name in tuning:

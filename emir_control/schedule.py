@@ -35,8 +35,8 @@ class Schedule:
             raise ParameterError(
                 f"schedule: forces and models have to be {shape[0]} rows of {shape[1]}"
             )
-        for name, along in (("strokes", 0), ("payloads", 0), ("forces", 0)):
-            if not np.all(np.diff(getattr(self, name), axis=along) > 0.0):
+        for name in ("strokes", "payloads", "forces"):
+            if not np.all(np.diff(getattr(self, name), axis=0) > 0.0):
                 raise ParameterError(f"schedule: {name} do not rise")
         if len({model.period for row in self.models for model in row}) != 1:
             raise ParameterError("schedule: the models differ in their period")

@@ -78,7 +78,6 @@ def joint_rates(machine: Machine, turn: float, stroke: float) -> tuple[float, fl
 
     turn: rad, of the joint in the move; stroke: m, of the piston in it.
     """
-    c, v = machine.cylinder, machine.valve
     arm = abs(stroke / turn) if turn else math.inf
-    lowering = v.flow_nominal * v.flow_ratio_lowering / c.area_lowering
-    return -lowering / arm, v.flow_nominal / c.area_lifting / arm
+    low, high = actuator(machine).static.speeds
+    return low / arm, high / arm

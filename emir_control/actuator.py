@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from emir_common.quantity import check_ranges, quantity
-from emir_control.prefilter import PrefilterParameters
+from emir_control.prefilter import PrefilterParameters, piston_force
 
 LAMINAR = 1e5  # Pa, below which a drop's square root turns into a straight line
 LEAST_OPEN = 0.05  # logic block: what the inverse reckons with at least
@@ -83,31 +83,30 @@ class Actuator:
         p = self.parameters
         return 2.0 * p.spool_damping / p.spool_frequency
 
+    @cached_property
+    def _beta(self) -> float:
+        """The stiffness of oil and vessels that is reckoned with, Pa."""
+        return self.softness * self.parameters.beta
+
     def stiffness(self, stroke: float) -> float:
         """Return k_h, N/m, at a stroke, m."""
         lifting, lowering = self._shares(stroke)
         s = self.parameters.static
-        beta = self.softness * self.parameters.beta
-        return beta * (lifting * s.area_lifting + lowering * s.area_lowering)
+        return self._beta * (lifting * s.area_lifting + lowering * s.area_lowering)
 
     def compression(self, stroke: float) -> float:
         """Return by how far the piston goes down on a shut lifting chamber, m/Pa."""
-        return 1.0 / (self.softness * self.parameters.beta * self._shares(stroke)[0])
+        return 1.0 / (self._beta * self._shares(stroke)[0])
 
     def force(self, lifting: float, lowering: float) -> float:
         """Return F, N, of the chambers' pressures, Pa."""
-        s = self.parameters.static
-        return lifting * s.area_lifting - lowering * s.area_lowering
+        return piston_force(lifting, lowering, self.parameters.static)
 
     def velocity(self, opening: float, oil: Oil) -> float:
         """Return u, m/s, of an opening in [-1, 1] of the metering edges."""
         lifting, lowering = self._shares(oil.stroke)
         into_lifting, into_lowering = self.flows(opening, oil)
-        driven = (
-            self.softness
-            * self.parameters.beta
-            * (lifting * into_lifting - lowering * into_lowering)
-        )
+        driven = self._beta * (lifting * into_lifting - lowering * into_lowering)
         return driven / self.stiffness(oil.stroke)
 
     def opening(self, wanted: float, oil: Oil) -> float:
@@ -168,7 +167,7 @@ class Actuator:
 
     def _changed(self, oil: Oil, at: Oil, opening: float, velocity: float, dt: float) -> Oil:
         """Return the oil after dt, s, at the rates of another instant's."""
-        s, beta = self.parameters.static, self.softness * self.parameters.beta
+        s, beta = self.parameters.static, self._beta
         lifting, lowering = self._shares(at.stroke)
         into_lifting, into_lowering = self.flows(opening, at)
         up = beta * lifting * (into_lifting / s.area_lifting - velocity)
@@ -203,8 +202,7 @@ class Actuator:
     @cached_property
     def fastest(self) -> float:
         """What the fully open valve gives the piston, lifting, m/s."""
-        s = self.parameters.static
-        return s.flow_lifting / s.area_lifting
+        return self.parameters.static.speeds[1]
 
     def next_logic(self, logic: float, lifting: float, dt: float) -> float:
         """Return the logic block's opening dt, s, later, p_H being the pressure, Pa."""

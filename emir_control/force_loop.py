@@ -9,6 +9,7 @@ from emir_control.filters import low_pass
 from emir_control.limits import LimitParameters, limited, off_the_ends
 from emir_control.prefilter import (
     PrefilterParameters,
+    piston_force,
     piston_stroke,
     piston_velocity,
     valve_command,
@@ -50,7 +51,6 @@ class ForceLoopInputs(NamedTuple):
     angle: float  # of the joint, rad
     pressure_lifting: float  # Pa
     pressure_lowering: float  # Pa
-    stroke: float | None = None  # m, of a linkage that is no triangle; None: from the angle
     direct: bool = False  # the velocity stands for a valve command that is to be handed on
 
 
@@ -83,7 +83,7 @@ class ForceLoop:
         An input that is not a number shuts the valve and leaves the force's state as it was. What
         is handed on is neither damped nor limited: who commands the valve does that himself.
         """
-        if not all(math.isfinite(value) for value in inputs if value is not None):
+        if not all(map(math.isfinite, inputs)):
             return state._replace(wanted=0.0), ForceLoopOutputs(0.0, math.nan, 0.0, 0.0, False)
         p = self.parameters
         if not math.isfinite(state.static_force):  # begun without a measurement
@@ -99,9 +99,7 @@ class ForceLoop:
         feedback = p.gain * (force - static_force)
         wanted = inputs.velocity_command
         wanted += piston_velocity(inputs.joint_rate_command, inputs.angle, p.prefilter)
-        stroke = inputs.stroke
-        if stroke is None:
-            stroke = piston_stroke(inputs.angle, p.prefilter)
+        stroke = piston_stroke(inputs.angle, p.prefilter)
         allowed = limited(wanted, state.wanted, stroke, dt, p.limits)
         velocity = off_the_ends(allowed - feedback, stroke, 0.0, p.limits)  # damping moves, too
         command = valve_command(velocity, p.prefilter)
@@ -111,6 +109,5 @@ class ForceLoop:
         return ForceLoopState(static_force, allowed), outputs
 
     def _force(self, inputs: ForceLoopInputs) -> float:
-        p = self.parameters.prefilter
-        lifting = inputs.pressure_lifting * p.area_lifting
-        return lifting - inputs.pressure_lowering * p.area_lowering
+        pressures = inputs.pressure_lifting, inputs.pressure_lowering
+        return piston_force(*pressures, self.parameters.prefilter)

@@ -22,7 +22,7 @@ from emir_control.drive_plan import (
     gentlest,
     onward,
 )
-from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
+from emir_control.prefilter import joint_angle, lever_arm, piston_stroke
 from emir_control.trajectory import Move
 
 Array = NDArray[np.float64]
@@ -143,7 +143,7 @@ class Planner:
         clamped, sag = boom.clamped(), boom.sag()
         bent = now.shape - clamped.rigid * now.angle - sag * math.cos(now.angle)
         swinging = now.swinging - now.rate * (clamped.rigid - sag * math.sin(now.angle))
-        arm = piston_velocity(1.0, now.angle, linkage)
+        arm = lever_arm(now.angle, linkage)
         pushed = (now.force - holding(boom, drive, now.angle)) / middle.stiffness
         begin = Begin(
             bent=clamped.shapes.T @ bent,
@@ -163,12 +163,13 @@ class Planner:
             angles = (angles[0] - 0.5 * SECANT, angles[0] + 0.5 * SECANT)
             strokes = (piston_stroke(angles[0], linkage), piston_stroke(angles[1], linkage))
         turn = angles[1] - angles[0]
+        low, high = linkage.speeds
         return Drive(
             arm=(strokes[1] - strokes[0]) / turn,
             stiffness=drive.stiffness(0.5 * (strokes[0] + strokes[1])),
             slope=(holding(boom, drive, angles[1]) - holding(boom, drive, angles[0])) / turn,
-            low=-linkage.flow_lowering / linkage.area_lowering,
-            high=linkage.flow_lifting / linkage.area_lifting,
+            low=low,
+            high=high,
         )
 
     def _laid_out(
@@ -178,7 +179,7 @@ class Planner:
         drive, linkage = self.drive, self.drive.parameters.static
         angle = start + motion.angle
         shape = np.outer(np.cos(angle), boom.sag()) + motion.bent @ boom.clamped().shapes.T
-        arms = np.array([piston_velocity(1.0, each, linkage) for each in angle])
+        arms = np.array([lever_arm(each, linkage) for each in angle])
         pushed = middle.stiffness * middle.arm / arms * motion.pushed
         return MotionPlan(
             stiffness=middle.stiffness,
@@ -213,5 +214,5 @@ def resting(boom: Boom, drive: Actuator, stroke: float) -> MotionPlan:
 
 def holding(boom: Boom, drive: Actuator, angle: float) -> float:
     """Return the piston force, N, that holds the boom at an angle, rad."""
-    arm = piston_velocity(1.0, angle, drive.parameters.static)
+    arm = lever_arm(angle, drive.parameters.static)
     return boom.holding_torque * math.cos(angle) / arm

@@ -35,6 +35,11 @@ class PrefilterParameters:
     def __post_init__(self) -> None:
         check_ranges(self)
 
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """The piston's steady velocities, m/s, with the valve fully open: lowering, lifting."""
+        return -self.flow_lowering / self.area_lowering, self.flow_lifting / self.area_lifting
+
 
 def valve_command(velocity: float, p: PrefilterParameters) -> float:
     """Return the valve command y2 in [-1, 1] that gives a steady piston velocity, m/s."""
@@ -78,6 +83,16 @@ def piston_velocity(joint_rate: float, angle: float, p: PrefilterParameters) -> 
     """Return the piston velocity, m/s, for a joint rate, rad/s, at the joint angle, rad (1)."""
     a, b, opening = p.triangle_a, p.triangle_b, angle + p.triangle_gamma0
     return joint_rate * a * b * math.sin(opening) / _length(angle, p)
+
+
+def lever_arm(angle: float, p: PrefilterParameters) -> float:
+    """Return dh/dalpha, m, the piston's way for an angle of the joint, at that angle, rad (1)."""
+    return piston_velocity(1.0, angle, p)
+
+
+def piston_force(lifting: float, lowering: float, p: PrefilterParameters) -> float:
+    """Return F = p_H A_H - p_S A_S, N, of the chambers' pressures, Pa (9)."""
+    return lifting * p.area_lifting - lowering * p.area_lowering
 
 
 def _length(angle: float, p: PrefilterParameters) -> float:

@@ -19,7 +19,7 @@ from scipy.linalg import expm, solve_discrete_are
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
-from emir_control.prefilter import joint_angle, piston_velocity
+from emir_control.prefilter import joint_angle, lever_arm
 
 Array = NDArray[np.float64]
 
@@ -201,8 +201,8 @@ def _continuous(boom: Boom, drive: Actuator, stroke: float, m: int) -> tuple[Arr
     """Return [A B], (n, n + 1), of the deviations, and k_h, N/m."""
     linkage = drive.parameters.static
     angle = joint_angle(stroke, linkage)
-    arm = piston_velocity(1.0, angle, linkage)
-    ahead, behind = (piston_velocity(1.0, angle + d, linkage) for d in (ANGLE_STEP, -ANGLE_STEP))
+    arm = lever_arm(angle, linkage)
+    ahead, behind = (lever_arm(angle + d, linkage) for d in (ANGLE_STEP, -ANGLE_STEP))
     force = boom.holding_torque * math.cos(angle) / arm
     stiffness = drive.stiffness(stroke)
     joint, n = boom.joint[:m], 2 * m + 4

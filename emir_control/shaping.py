@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_control.boom import BoomTable
 from emir_control.cascade import Cascade, CascadeInputs, CascadeOutputs, CascadeState
-from emir_control.prefilter import PrefilterParameters, joint_angle, piston_velocity
+from emir_control.prefilter import PrefilterParameters, joint_angle, lever_arm
 from emir_control.trajectory import Move, Reference, Trapezoid
 
 Shaper = Literal["zv", "zvd"]
@@ -147,7 +147,7 @@ class ShapedCascade:
             return state
         p, start = self.parameters, inputs.reference.stroke
         angle = joint_angle(start, p.linkage)
-        torque = state.force * piston_velocity(1.0, angle, p.linkage) / math.cos(angle)
+        torque = state.force * lever_arm(angle, p.linkage) / math.cos(angle)
         boom = p.boom.loaded(p.boom.payload(torque)).clamped()
         frequency = math.sqrt(boom.stiffness[0]) / (2.0 * math.pi)
         move = shaped(inputs.move, impulses(p.shaper, frequency, p.damping))

@@ -130,7 +130,6 @@ def _least(p: LqgParameters, case: Case) -> float:
     linkage = p.actuator.static
     turn = joint_angle(piston_stroke(case.angle, linkage) + case.distance, linkage) - case.angle
     arm = case.distance / turn
-    low = -linkage.flow_lowering / linkage.area_lowering
-    high = linkage.flow_lifting / linkage.area_lifting
+    low, high = linkage.speeds
     boom = p.boom.loaded(case.payload).clamped()
     return limit(boom, Task(turn, case.duration, low / arm, high / arm)).largest

@@ -9,8 +9,8 @@ from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.prefilter import (
     PrefilterParameters,
     joint_angle,
+    lever_arm,
     piston_stroke,
-    piston_velocity,
 )
 from emir_control.scheduled_pfc import ScheduledPfc
 from emir_control.trajectory import Reference
@@ -68,7 +68,7 @@ class Tip:
 
     def _inputs(self, inputs: TipInputs, sag: float) -> PfcInputs:
         set_point = joint_angle(inputs.reference.stroke, self.linkage)
-        arm = piston_velocity(1.0, set_point, self.linkage)
+        arm = lever_arm(set_point, self.linkage)
         return PfcInputs(
             set_point,
             inputs.reference.velocity / arm,

@@ -12,7 +12,7 @@ from emir_control.filling import NOT_FILLED, Filled
 from emir_control.lqg.parameters import LqgParameters
 from emir_control.lqg.state import LqgInputs, LqgState, Rest
 from emir_control.motion_plan import MotionPlan, Planner, resting
-from emir_control.prefilter import joint_angle, piston_stroke, piston_velocity
+from emir_control.prefilter import joint_angle, lever_arm, piston_stroke
 from emir_control.regulator import regulator
 from emir_control.spool_play import Sent
 from emir_control.trajectory import NO_MOVE, Move
@@ -76,7 +76,7 @@ class Beginning:
 
     def weight(self, angle: float) -> float:
         """Return the force at rest at an angle, rad, over the torque of the level boom, 1/m."""
-        return math.cos(angle) / piston_velocity(1.0, angle, self.parameters.actuator.static)
+        return math.cos(angle) / lever_arm(angle, self.parameters.actuator.static)
 
     def begun(
         self, rest: Rest, inputs: LqgInputs, logic: float, sent: Sent, filled: Filled
@@ -112,11 +112,9 @@ class Beginning:
 
         Who stands beyond the margin may stay there.
         """
-        p = self.parameters.limits
         here = piston_stroke(rest.angle, self.parameters.actuator.static)
-        low = min(p.stroke_low + p.end_margin, here)
-        high = max(p.stroke_high - p.end_margin, here)
-        start, end = (min(max(place, low), high) for place in ends)
+        low, high = self.parameters.limits.free_stroke
+        start, end = (min(max(place, min(low, here)), max(high, here)) for place in ends)
         return start, end
 
     def _payload(self, force: float, angle: float) -> float:

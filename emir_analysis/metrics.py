@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from emir_analysis.root_mean_square import rms
 from emir_analysis.run_signals import at, piston
 from emir_analysis.signals import Recording
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, CYLINDER_PREVIEW
+from emir_msgs_py.topics import CONTROL_PERIOD, CYLINDER_PREVIEW
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ FINE_LAG = 1e-3  # s
 PAPER_LAG = 0.4  # s, T of law (11)
 BOOM_LENGTH = 22.5  # m, paper 1
 MOVING = 1e-4  # m/s of reference speed
-SEEN_AHEAD = len(CYLINDER_PREVIEW.fields) * CONTROL_PERIOD_NS * 1e-9  # s
+SEEN_AHEAD = len(CYLINDER_PREVIEW.fields) * CONTROL_PERIOD  # s
 
 
 @dataclass(frozen=True)

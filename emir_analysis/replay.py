@@ -42,6 +42,7 @@ from emir_control.tip import Tip
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.robot_topics import TCP_POSE
 from emir_msgs_py.topics import (
+    CONTROL_PERIOD,
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
     OUTER_LOOPS,
@@ -97,7 +98,7 @@ def _replay_joint1(
     kept = tuple(topic for topic in answers if there.full_name(topic))
     outputs = by_stamp(bag, kept or answers, CONTROL_PERIOD_NS)
     obedient = Obedience(made, values, changed, orders(bag, f"{node}_node"))
-    rows = obedient.answers(sorted(inputs.items()), outputs, CONTROL_PERIOD_NS * 1e-9)
+    rows = obedient.answers(sorted(inputs.items()), outputs, CONTROL_PERIOD)
     if not rows:
         raise InputError(f"{bag}: no control period with all topics of {node}: not in lock step?")
     return compared(answers, rows)

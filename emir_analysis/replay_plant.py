@@ -11,7 +11,7 @@ from emir_analysis.errors import InputError
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
-from emir_msgs_py.topics import PLANT_PERIOD_NS, PLANT_TOPICS, TRUTH, VALVE_COMMAND
+from emir_msgs_py.topics import PLANT_PERIOD, PLANT_PERIOD_NS, PLANT_TOPICS, TRUTH, VALVE_COMMAND
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
@@ -97,5 +97,5 @@ def _rows(
         signals = reading._asdict() | dict(zip(TRUTH.fields, np.asarray(truth), strict=True))
         rows.append((outputs[stamp], {name: float(value) for name, value in signals.items()}))
         command = finite(commands.get(stamp, command))
-        state, truth = plant.step(state, command, PLANT_PERIOD_NS * 1e-9)
+        state, truth = plant.step(state, command, PLANT_PERIOD)
     return rows

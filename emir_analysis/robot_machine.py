@@ -17,16 +17,11 @@ from emir_msgs_py.robot_topics import (
     TRUE_QUANTITIES,
     of_joints,
 )
-from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, TICKS
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, PLANT_PERIOD_NS, TICKS
 from emir_plant.robot.plant import RobotPlant, RobotTruth
 from emir_plant.robot.sensors import RobotMeasurement, measure
 
 Array = NDArray[np.float64]
-
-
-def period(control: NodeControl) -> float:
-    """Return a control's period, s: that of what it gives."""
-    return PLANT_PERIOD if control.outputs[0].every == "plant" else CONTROL_PERIOD
 
 
 def commands(signals: Signals) -> Array:
@@ -72,9 +67,9 @@ class RobotLoop:
         for tick in range(last + 1):
             new = sensor_signals(self.plant, truth, tick)
             for k, control in enumerate(self.controls):
-                dt = period(control)
-                if dt == PLANT_PERIOD or tick % TICKS == 0:
-                    states[k], outputs = control.step(states[k], signals | new, dt)
+                period = control.outputs[0].period_ns
+                if tick * PLANT_PERIOD_NS % period == 0:
+                    states[k], outputs = control.step(states[k], signals | new, period * 1e-9)
                     new |= outputs
             signals |= new
             for name, value in new.items():

@@ -26,7 +26,7 @@ from emir_common.quantity import ParameterError
 from emir_control.cascade import Cascade
 from emir_control.pfc import Pfc
 from emir_control.trajectory import TrajectoryParameters
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
+from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
 from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
@@ -60,8 +60,7 @@ def replay_robot(
             raise ParameterError(f"{node}: {error}") from None
 
     control = made({**values, **changed})
-    fast = control.outputs[0].every == "plant"
-    period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
+    period = control.outputs[0].period_ns
     slow = _recorded(bag, [t for t in control.inputs if t.every == "control"], CONTROL_PERIOD_NS)
     quick = _recorded(bag, [t for t in control.inputs if t.every == "plant"], period)
     outputs = by_stamp(bag, control.outputs, period)

@@ -1,7 +1,7 @@
 """What each signal of the topic table means, in words; recordings carry it beside path and unit."""
 
 from emir_msgs_py.robot_topics import JOINTS
-from emir_msgs_py.topics import OUTER_LOOPS, VALVE_LOOPS, Topic
+from emir_msgs_py.topics import CYLINDER_PREVIEW, OUTER_LOOPS, VALVE_LOOPS, Topic
 
 MEANINGS = {
     "angle": "joint angle alpha_1, measured by the resolver",
@@ -37,8 +37,8 @@ MEANINGS = {
     "saturated": "1 where the valve command is at its limit",
 }
 MEANINGS |= {
-    f"reference_stroke_{k}_ahead": f"demanded stroke {k} control periods ahead"
-    for k in range(1, 21)
+    name: f"demanded stroke {k} control periods ahead"
+    for k, name in enumerate(CYLINDER_PREVIEW.fields, start=1)
 }
 PFC_MEANINGS = {
     "unlimited": "command before its limits",
@@ -61,9 +61,7 @@ LQG_MEANINGS = {
     "deflection": "the TCP's dynamic deflection off the plan, estimated",
     "limited": "1 where command or plan is held off an end of the stroke",
 }
-MEANINGS |= {
-    f"{name}_{term}": text for name in ("lqg", "mpc") for term, text in LQG_MEANINGS.items()
-}
+MEANINGS |= {f"{name}_{term}": text for name in VALVE_LOOPS for term, text in LQG_MEANINGS.items()}
 MEANINGS |= {
     "move_since": "time since the start of the move under way, negative before the next one",
     "move_duration": "how long that move takes",
@@ -76,8 +74,6 @@ MEANINGS |= {
     for name in VALVE_LOOPS
 }
 MEANINGS["applied_command"] = "piston velocity asked for by the controller that is chosen"
-
-
 MEANINGS |= {
     "true_rate": "rate of the joint's angle",
     "supply_pressure": "pressure at the pump",

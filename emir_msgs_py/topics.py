@@ -59,11 +59,16 @@ class Topic:
         """Return the nodes of which one publishes it."""
         return (self.publisher, *self.instead)
 
+    @property
+    def period_ns(self) -> int:
+        """Return the time between two messages, ns."""
+        return PLANT_PERIOD_NS if self.every == "plant" else CONTROL_PERIOD_NS
+
 
 def named_numbers(
     name: str,
     publisher: str,
-    every: Literal["plant", "control"],
+    every: Every,
     units: dict[str, str],
     quality: Quality = "sensor",
 ) -> Topic:

@@ -18,7 +18,6 @@ from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     OFFERED_COMMANDS,
-    PLANT_PERIOD_NS,
     ROBOT,
     SELECTOR_TERMS,
     VALVE_COMMAND,
@@ -73,8 +72,7 @@ class ControlNode(Shell):
         super().__init__(name, [], arguments, None if robot is None else [])
         if robot is not None and self.model == ROBOT:
             inputs, outputs = robot.inputs, robot.outputs
-        fast = outputs[0].every == "plant"
-        self._period = PLANT_PERIOD_NS if fast else CONTROL_PERIOD_NS
+        self._period = outputs[0].period_ns
         self._held: dict[str, Signals] = {}  # what comes less often than this node acts
         self._own = name.removesuffix("_node")
         self._inputs: dict[str, Topic] = {}

@@ -8,7 +8,7 @@ from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
 from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, ROBOT, SELECTOR_TERMS
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, ROBOT, SELECTOR_TERMS
 from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
@@ -18,7 +18,7 @@ LIVE = ("gain",)  # the prefilter has none of that name
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
 # A command is due every period. Looked for every plant period, its absence shuts the valve
 # within the period in which it was due.
-TIMEOUT = 2e-9 * (CONTROL_PERIOD_NS - PLANT_PERIOD_NS // 2)  # s
+TIMEOUT = 2.0 * CONTROL_PERIOD - PLANT_PERIOD  # s
 
 
 class ForceLoopNode(ControlNode):
@@ -47,7 +47,7 @@ class ForceLoopNode(ControlNode):
         LiveParameters(self, parameters, LIVE, tune)
         reject_unknown(self)
         if not self.lockstep:
-            self.start_timer(PLANT_PERIOD_NS * 1e-9, self._watch)
+            self.start_timer(PLANT_PERIOD, self._watch)
 
     def _watch(self) -> None:
         missing = self.missing()

@@ -16,10 +16,12 @@ from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import ROBOT_PLANT_TOPICS
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    PLANT_PERIOD,
     PLANT_PERIOD_NS,
     PLANT_TOPICS,
     RECORDED,
     ROBOT,
+    TICKS,
 )
 from emir_plant.plant import REST_PRESSURE
 from emir_ros import qos
@@ -88,19 +90,19 @@ class PlantNode(Shell):
         return self.machine.truth
 
     def _step(self, command: Signals) -> None:
-        self.machine.step(command, PLANT_PERIOD_NS * 1e-9)
+        self.machine.step(command, PLANT_PERIOD)
         self.tick += 1
 
     def _publish_sensors(self, stamp: int) -> None:
         self.publish_all(stamp, self.machine.signals(self.tick))
-        if self.tick % (CONTROL_PERIOD_NS // PLANT_PERIOD_NS) == 0:
+        if self.tick % TICKS == 0:
             self.machine.show(stamp)
 
     def _show_progress(self) -> None:
         if time.monotonic() - self._said > 1.0:
             self._said = time.monotonic()
             total = f" of {self.own.duration:g}" if self.own.duration else ""
-            self.get_logger().info(f"t = {self.tick * PLANT_PERIOD_NS * 1e-9:.1f}{total} s")
+            self.get_logger().info(f"t = {self.tick * PLANT_PERIOD:.1f}{total} s")
 
     def _is_over(self) -> bool:
         last = round(self.own.duration * 1e9 / CONTROL_PERIOD_NS) * CONTROL_PERIOD_NS
@@ -134,8 +136,7 @@ class PlantNode(Shell):
         if self._is_over():
             self.end()
             return
-        fast = self._valves.every == "plant"
-        for _ in range(1 if fast else CONTROL_PERIOD_NS // PLANT_PERIOD_NS):
+        for _ in range(self._valves.period_ns // PLANT_PERIOD_NS):
             self._step(self._command[1])
             self._publish_tick()
         self._asked = time.monotonic()
@@ -157,19 +158,19 @@ class PlantNode(Shell):
 
     def _start_realtime(self) -> None:
         self._command_received = -math.inf
-        self._beat = Beat(PLANT_PERIOD_NS * 1e-9)
+        self._beat = Beat(PLANT_PERIOD)
         self.diagnostics.figures = self._figures
         self._compile()
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self._started: float | None = None
-        self.create_timer(PLANT_PERIOD_NS * 1e-9, self._on_timer)
+        self.create_timer(PLANT_PERIOD, self._on_timer)
 
     def _compile(self) -> None:
         """Take a step that does not count: the very first compiles the machine, for seconds."""
         machine = self.machine
         state, truth = machine.state, machine.truth
         with naming(self):
-            machine.step(self._shut, PLANT_PERIOD_NS * 1e-9)
+            machine.step(self._shut, PLANT_PERIOD)
         machine.state, machine.truth = state, truth
 
     def _figures(self) -> dict[str, str]:
@@ -177,11 +178,11 @@ class PlantNode(Shell):
 
     def _on_timer(self) -> None:
         if self._started is None or not self.active:  # time stands still
-            self._started = time.monotonic() - self.tick * PLANT_PERIOD_NS * 1e-9
+            self._started = time.monotonic() - self.tick * PLANT_PERIOD
             return
         self._beat.tick(self.seconds())
-        due = int((time.monotonic() - self._started) / (PLANT_PERIOD_NS * 1e-9))
-        if due - self.tick > CONTROL_PERIOD_NS // PLANT_PERIOD_NS:
+        due = int((time.monotonic() - self._started) / PLANT_PERIOD)
+        if due - self.tick > TICKS:
             self.get_logger().warning(
                 f"{due - self.tick} plant periods late", throttle_duration_sec=2.0
             )

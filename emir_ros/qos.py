@@ -13,7 +13,7 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
 
 from emir_common.quantity import ParameterError
-from emir_msgs_py.topics import CONTROL_PERIOD_NS, PLANT_PERIOD_NS, Topic
+from emir_msgs_py.topics import Topic
 
 DEPTH = 64  # plant periods: half a second of sensor data
 
@@ -56,8 +56,7 @@ def promised(topic: Topic, *, lockstep: bool) -> QoSProfile:
     """Return `offered`, in real time with a deadline of two periods and a sign of life."""
     profile = offered(lockstep=lockstep)
     if not lockstep:
-        period = PLANT_PERIOD_NS if topic.every == "plant" else CONTROL_PERIOD_NS
-        profile.deadline = Duration(nanoseconds=2 * period)
+        profile.deadline = Duration(nanoseconds=2 * topic.period_ns)
         profile.liveliness_lease_duration = LEASE
     return profile
 

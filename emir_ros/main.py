@@ -10,8 +10,6 @@ from types import FrameType
 from typing import Any
 
 import rclpy
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -90,7 +88,7 @@ def spin(executor: Any, node: Shell, ended: Future, stop: StopRequest) -> None:
         if stop.made and not ended.done():
             ended.set_result(None)
 
-    timer = node.create_timer(LOOK_PERIOD, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    timer = node.start_steady_timer(LOOK_PERIOD, look)
     while not ended.done():
         executor.spin_until_future_complete(ended, timeout_sec=LOOK_PERIOD)
     node.destroy_timer(timer)

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Header
 
@@ -65,7 +63,6 @@ class PlantNode(Shell):
         self._recorder = declare(self, "wait_for_recorder", False, "lock step waits for it, too")
         reject_unknown(self)
         self.tick = 0
-        self._wall = Clock(clock_type=ClockType.STEADY_TIME)
         self._said = time.monotonic()
         self._valves = self.machine.command
         self._shut: Signals = dict.fromkeys(self._valves.fields, 0.0)
@@ -114,7 +111,7 @@ class PlantNode(Shell):
         profile = qos.offered(lockstep=True)
         self._send_clock = sender(self.create_publisher(ClockMessage, "/clock", profile))
         self.create_subscription(Header, RECORDED, self._on_recorded, profile, raw=True)
-        self.create_timer(0.5, self._check_patience, clock=self._wall)
+        self.start_steady_timer(0.5, self._check_patience)
         self._asked = time.monotonic()
         self._publish_tick()
 

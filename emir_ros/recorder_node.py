@@ -111,7 +111,7 @@ class RecorderNode(Shell):
         self._answers: dict[str, dict[str, Any]] = {}
         self._shape: str | None = None if PLANT in nodes else ""
         if not self._described:
-            self._record_of_parameters = ParameterRecord(self, nodes, self._on_answers)
+            ParameterRecord(self, nodes, self._on_answers)
         self.create_subscription(String, DESCRIPTION, self._on_shape, qos.latched())
         self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:

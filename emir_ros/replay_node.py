@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 
 from mcap.records import Channel, Schema
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -78,8 +76,7 @@ class ReplayNode(Shell):
         self._clock_publisher = self.create_publisher(ClockMessage, CLOCK, 10)
         self.create_service(SetBool, "~/pause", self._on_pause)
         self._looked = time.monotonic()
-        wall = Clock(clock_type=ClockType.STEADY_TIME)  # else it would wait for its own /clock
-        self.create_timer(PERIOD, self._on_timer, clock=wall)
+        self.start_steady_timer(PERIOD, self._on_timer)  # else it would wait for its own /clock
 
     def close(self) -> None:
         """Wait until what was published last has been received."""

@@ -72,7 +72,7 @@ class Shell(LifecycleNode):
         if self.model not in known:
             raise ParameterError(f"{name}: model {self.model!r}: there is {', '.join(known)}")
         check_overrides(self)
-        self._outputs: dict[str, Callable[[int, Mapping[str, float]], None]] = {}
+        self._outputs: list[Callable[[int, Mapping[str, float]], None]] = []
         self.last_stamp = -1  # ns, of the latest step in lock step
         self.diagnostics = Diagnostics(self, self.now_ns, lockstep=self.lockstep)
         self._offer(known[self.model])
@@ -109,8 +109,7 @@ class Shell(LifecycleNode):
         return super().on_deactivate(state)
 
     def _offer(self, outputs: Sequence[Topic]) -> None:
-        for topic in outputs:
-            self._outputs[topic.name] = self._output(topic)
+        self._outputs += map(self._output, outputs)
 
     def _output(self, topic: Topic) -> Callable[[int, Mapping[str, float]], None]:
         encode, send = Wire(topic).encode, sender(self._publisher(topic))
@@ -181,13 +180,9 @@ class Shell(LifecycleNode):
         """Return the subscriptions that an executor shall look after."""
         return iter(()) if self.taken_in_turn else super().subscriptions
 
-    def publish(self, topic: Topic, stamp: int, signals: Mapping[str, float]) -> None:
-        """Publish a topic's signals, stamped in ns."""
-        self._outputs[topic.name](stamp, signals)
-
     def publish_all(self, stamp: int, signals: Mapping[str, float]) -> None:
         """Publish the signals of all topics that the node has, stamped in ns."""
-        for publish in self._outputs.values():
+        for publish in self._outputs:
             publish(stamp, signals)
 
     def create_subscription(
@@ -243,14 +238,19 @@ class Shell(LifecycleNode):
 
         The computer's time of day may be set while a machine moves; a steady clock does not jump.
         """
-        simulated = self.get_parameter("use_sim_time").value
-        clock = None if simulated else Clock(clock_type=ClockType.STEADY_TIME)
 
         def call() -> None:
             if self.active:
                 callback()
 
-        self.create_timer(period, call, clock=clock)
+        if self.get_parameter("use_sim_time").value:
+            self.create_timer(period, call)
+        else:
+            self.start_steady_timer(period, call)
+
+    def start_steady_timer(self, period: float, callback: Callable[[], None]) -> Any:
+        """Call back every period, s, of a steady clock, whatever /clock says; return the timer."""
+        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def seconds(self) -> float:
         """Return the time of the clock that timers run on, s."""

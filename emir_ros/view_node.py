@@ -5,9 +5,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
-
 from emir_analysis.errors import InputError
 from emir_analysis.view.command import start_server
 from emir_analysis.view.frames import Frame, tcp_deflection
@@ -75,7 +72,7 @@ class ViewNode(Shell):
         for topic in SHOWN if self.model == JOINT1 else robot.TOPICS:
             self._listen(topic)
         self._page = Page(self._server, machine, "EMIR, live")
-        self.create_timer(PERIOD, self._show, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.start_steady_timer(PERIOD, self._show)
         self.get_logger().info(f"http://localhost:{port} shows the graph")
 
     @property

@@ -34,7 +34,7 @@ class Player(Shell):
     def serve(self) -> None:
         """Say something."""
         self.stamp += 1
-        self.publish(self.said, self.stamp, dict.fromkeys(self.said.fields, 0.0))
+        self.publish_all(self.stamp, dict.fromkeys(self.said.fields, 0.0))
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from emir_analysis.info import info, text
+from emir_analysis.node_controls import CascadeControl
 from emir_analysis.recorded_orders import orders
 from emir_msgs_py.topics import CASCADE_TERMS, CONTROL_PERIOD_NS
 from emir_ros.cascade_node import CascadeNode
@@ -121,9 +122,10 @@ def test_a_change_is_recorded(tmp_path: Path) -> None:
 
     until(lambda: cascade.count_subscribers(CASCADE_TERMS.name) == 1)
     until(lambda: cascade.count_subscribers("/parameter_events") >= 1)
+    said = {name: 0.0 for topic in CascadeControl.outputs for name in topic.fields}
     sent = 0
     while not recorder.changes:
-        cascade.publish(CASCADE_TERMS, 0, dict.fromkeys(CASCADE_TERMS.fields, 0.0))
+        cascade.publish_all(0, said)
         sent += 1
         assert _set(cascade, "gain", 2.0 + 0.01 * sent) == ""
         assert sent < 100

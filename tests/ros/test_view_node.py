@@ -50,8 +50,7 @@ def test_the_page_shows_what_is_published(port: int) -> None:
     while "110.0" not in view.shown or "300.0" not in view.shown:
         assert time.monotonic() < deadline, view.shown
         stamp += 8_000_000
-        for topic in SENT:
-            machine.publish(topic, stamp, SIGNALS)
+        machine.publish_all(stamp, SIGNALS)
         executor.spin_once(timeout_sec=0.05)
     assert f"| joint angle | {math.degrees(0.8):.2f} | deg |" in view.shown
     assert "| valve | - | % |" in view.shown  # nobody publishes it
@@ -71,7 +70,7 @@ def test_inactive_it_takes_nothing_in(port: int) -> None:
     def publish_until(condition: Callable[[], bool]) -> None:
         while not condition():
             assert time.monotonic() < deadline
-            machine.publish(CYLINDER_STATES, next(stamps), SIGNALS)
+            machine.publish_all(next(stamps), SIGNALS)
             executor.spin_once(timeout_sec=0.05)
 
     publish_until(lambda: len(heard) > 20)
@@ -104,14 +103,8 @@ def test_a_browser_shows_the_running_graph(port: int, model: str) -> None:
     executor = SingleThreadedExecutor()
     for node in (view_node, machine):
         executor.add_node(node)
-    stamp = itertools.count(0, 8_000_000)
-
-    def publish() -> None:
-        now = next(stamp)
-        for topic in topics:
-            machine.publish(topic, now, everything)
-
-    machine.create_timer(0.02, publish)
+    stamps = itertools.count(0, 8_000_000)
+    machine.create_timer(0.02, lambda: machine.publish_all(next(stamps), everything))
     over = threading.Event()
 
     def spin() -> None:

@@ -10,26 +10,19 @@ from numpy.typing import NDArray
 
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.disturbance import LoadChange, reloaded
-from emir_analysis.node_controls import CascadeControl, ForceLoopControl, situation
-from emir_control.force_loop import ForceLoop, ForceLoopParameters
-from emir_control.trajectory import AwayAndBack, TrajectoryInputs
-from emir_msgs_py.topics import (
-    CONTROL_PERIOD,
-    CYLINDER_MOVE,
-    CYLINDER_PREVIEW,
-    CYLINDER_REFERENCE,
-    PLANT_PERIOD,
-    TICKS,
-    TRUTH,
+from emir_analysis.node_controls import (
+    CascadeControl,
+    ForceLoopControl,
+    TrajectoryControl,
+    plant_signals,
 )
+from emir_control.force_loop import ForceLoop, ForceLoopParameters
+from emir_control.trajectory import AwayAndBack
+from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, TICKS
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure
 
 Array = NDArray[np.float64]
-
-REFERENCE_SIGNALS = (
-    *CYLINDER_REFERENCE.fields, *CYLINDER_PREVIEW.fields, *CYLINDER_MOVE.fields,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,8 @@ class ClosedLoop:
         Returns every signal of the topic table by name: those of the plant with one value each
         plant period, those of the controllers with one each control period, both ends included.
         """
-        plant, damped = self.plant, ForceLoopControl(self.force_loop)
+        plant = self.plant
+        planned, damped = TrajectoryControl(self.trajectory), ForceLoopControl(self.force_loop)
         state = plant.initial(angle, pressure_lowering)
         truth = plant.outputs(state)
         changing = round(self.change.time / PLANT_PERIOD) if self.change else -1
@@ -63,20 +57,12 @@ class ClosedLoop:
                 plant, state = reloaded(plant, state, self.change.payload)
                 truth = plant.outputs(state)
             reading = measure(plant, truth, tick, state)
-            _append(rows, reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True)))
+            _append(rows, plant_signals(reading, truth))
             if tick % TICKS == 0:
-                here = TrajectoryInputs(reading.stroke)
-                following = following or self.trajectory.initial(here)
-                preview = self.trajectory.ahead(
-                    following, len(CYLINDER_PREVIEW.fields), CONTROL_PERIOD
-                )
-                move = self.trajectory.move(following, CONTROL_PERIOD)
-                following, reference = self.trajectory.step(following, here, CONTROL_PERIOD)
-
-                now = situation(reference, preview, reading, move)
+                measured = reading._asdict()
+                following, signals = planned.step(following, measured, CONTROL_PERIOD)
+                now = measured | signals
                 controlling, wanted = self.outer.step(controlling, now, CONTROL_PERIOD)
-
-                signals = {name: now[name] for name in REFERENCE_SIGNALS}
                 if "velocity_command" in wanted:
                     damping, valve = damped.step(damping, now | wanted, CONTROL_PERIOD)
                     signals |= valve

@@ -48,10 +48,12 @@ from emir_msgs_py.topics import (
     PFC_TIP_TERMS,
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
+    TRUTH,
     VALVE_COMMAND,
     VALVE_LOOPS,
     VELOCITY_COMMAND,
 )
+from emir_plant.core import Truth
 from emir_plant.sensors import Measurement
 
 
@@ -62,6 +64,11 @@ def situation(
     wanted = {"reference_stroke": reference.stroke, "reference_velocity": reference.velocity}
     ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
     return reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
+
+
+def plant_signals(reading: Measurement, truth: Truth) -> Signals:
+    """Return what the plant publishes in a period, by signal; the table of topics is in order."""
+    return reading._asdict() | dict(zip(TRUTH.fields, truth, strict=True))
 
 
 class _Boom:

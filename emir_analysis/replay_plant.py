@@ -5,13 +5,12 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from emir_analysis.errors import InputError
+from emir_analysis.node_controls import plant_signals
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError
-from emir_msgs_py.topics import PLANT_PERIOD, PLANT_PERIOD_NS, PLANT_TOPICS, TRUTH, VALVE_COMMAND
+from emir_msgs_py.topics import PLANT_PERIOD, PLANT_PERIOD_NS, PLANT_TOPICS, VALVE_COMMAND
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
@@ -93,9 +92,7 @@ def _rows(
         stamp = tick * PLANT_PERIOD_NS
         if stamp not in outputs:
             break  # a gap: what follows has no known command
-        reading = measure(plant, truth, tick, state)
-        signals = reading._asdict() | dict(zip(TRUTH.fields, np.asarray(truth), strict=True))
-        rows.append((outputs[stamp], {name: float(value) for name, value in signals.items()}))
+        rows.append((outputs[stamp], plant_signals(measure(plant, truth, tick, state), truth)))
         command = finite(commands.get(stamp, command))
         state, truth = plant.step(state, command, PLANT_PERIOD)
     return rows

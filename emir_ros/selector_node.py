@@ -16,7 +16,7 @@ from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
 from emir_ros.control_shell import ControlNode
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, reject_unknown
+from emir_ros.node_parameters import declare, naming, reject_unknown
 
 
 class SelectorNode(ControlNode):
@@ -32,12 +32,9 @@ class SelectorNode(ControlNode):
         switched: list[str] = declare(self, "switch_to", [names[0]], "to what, beginning with 0 s")
         if len(times) != len(switched):
             raise ParameterError("selector_node: switch_times and switch_to differ in length")
-        try:
-            self.selector = Selector(
-                names, [Switch(*pair) for pair in zip(times, switched, strict=True)]
-            )
-        except ParameterError as error:
-            raise ParameterError(f"selector_node: {error}") from None
+        with naming(self):
+            switches = [Switch(*pair) for pair in zip(times, switched, strict=True)]
+            self.selector = Selector(names, switches)
         about = f"which one drives, of {', '.join(names)}; may be set at any time"
         self.declare_parameter("controller", switched[0], ParameterDescriptor(description=about))
         first: str = self.get_parameter("controller").value

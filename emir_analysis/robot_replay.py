@@ -13,26 +13,24 @@ from emir_analysis.robot_controls import (
     RobotPfcControl,
     RobotTrajectoryControl,
 )
+from emir_analysis.robot_files import FILES, robot_of
 from emir_analysis.robot_setup import (
     cascade_parameters,
     force_loops,
     path_parameters,
     pfc_parameters,
-    trajectory,
+    trajectory_of,
 )
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
-from emir_common.parameter_tree import declared, with_values
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control.cascade import Cascade
 from emir_control.pfc import Pfc
-from emir_control.trajectory import TrajectoryParameters
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, Topic
 from emir_plant.robot import require_pinocchio
-from emir_plant.robot.sheet import robot
 
 NODES = ("trajectory", "cascade", "pfc", "force_loop")
 PLANT = "plant"
-FILES = ("robot_file", "machine_file")
 
 
 def replay_robot(
@@ -90,11 +88,9 @@ def _control(node: str, values: dict[str, Any]) -> NodeControl:
         return RobotCascadeControl(Cascade(with_values(cascade_parameters(), values)))
     if node == "pfc":
         return RobotPfcControl(Pfc(with_values(pfc_parameters(), values)))
-    sheet = robot(*(Path(str(n)) if n else None for n in (values.pop(f, "") for f in FILES)))
+    sheet = robot_of(values)
+    values = {name: value for name, value in values.items() if name not in FILES}
     if node == "force_loop":
         return RobotForceLoopControl(with_values(force_loops(sheet), values))
     name = values.pop("trajectory", "lift-lower")
-    path = path_parameters(sheet)
-    of_path = {key: values.pop(key) for key in tuple(values) if key in declared(path)}
-    move = with_values(TrajectoryParameters(), values)
-    return RobotTrajectoryControl(trajectory(sheet, name, move, with_values(path, of_path)))
+    return RobotTrajectoryControl(trajectory_of(sheet, name, path_parameters(sheet), values))

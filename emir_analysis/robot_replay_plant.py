@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from emir_analysis.control_protocols import Signals
 from emir_analysis.replay_plant import check_recorded, check_start, finite, number
+from emir_analysis.robot_files import FILES, robot_of
 from emir_analysis.robot_machine import commands, sensor_signals
-from emir_analysis.robot_replay import FILES
 from emir_analysis.robot_setup import Posture
 from emir_analysis.stamped import FieldComparison, by_stamp, compared
 from emir_common.parameter_tree import declared, with_values
@@ -20,7 +20,6 @@ from emir_msgs_py.topics import PLANT_PERIOD, PLANT_PERIOD_NS
 from emir_plant.plant import SimulationError
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.reach import PostureError
-from emir_plant.robot.sheet import robot
 
 MAIN = "main."  # joint 1's parameters have no such word in front of them in the graph
 ANGLES = "initial_angles."
@@ -40,7 +39,7 @@ def replay_robot_plant(
     """
     check_recorded(bag, values, (PRESSURE,))
     given = {**values, **changed}
-    machine = robot(*(Path(str(given[name])) if given.get(name) else None for name in FILES))
+    machine = robot_of(given)
     paths = {path.removeprefix(MAIN): path for path in declared(machine)}
     start = {f"{ANGLES}{joint}" for joint in declared(Posture())}
     for name in changed:

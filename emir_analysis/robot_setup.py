@@ -4,6 +4,7 @@ Needs no Pinocchio.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.machine_model import actuator
+from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator
 from emir_control.arm import JOINTS, Arm, ArmParameters
@@ -196,3 +198,16 @@ def trajectory(
         weigh=bool(path.weigh),
         joint=path.joint,
     )
+
+
+def trajectory_of(
+    robot: Robot, name: str, path: RobotPathParameters, values: Mapping[str, Any]
+) -> RobotTrajectory:
+    """Return the trajectory of that name with some of path's and move's values, by dotted name.
+
+    Raises ParameterError for an unknown name or a value that cannot be.
+    """
+    of_path = {key: value for key, value in values.items() if key in declared(path)}
+    of_move = {key: value for key, value in values.items() if key not in of_path}
+    move = with_values(TrajectoryParameters(), of_move)
+    return trajectory(robot, name, move, with_values(path, of_path))

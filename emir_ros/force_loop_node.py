@@ -12,7 +12,7 @@ from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, ROBOT, SELECTOR_TE
 from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
-from emir_ros.node_parameters import declare, declare_robot, declare_tree, reject_unknown
+from emir_ros.node_parameters import declare, declare_robot_sheet, declare_tree, reject_unknown
 
 LIVE = ("gain",)  # the prefilter has none of that name
 SHUT = ForceLoopOutputs(0.0, float("nan"), 0.0, 0.0, False)
@@ -35,7 +35,7 @@ class ForceLoopNode(ControlNode):
         mine, six = ForceLoopControl, RobotForceLoopControl
         super().__init__("force_loop_node", mine.inputs, mine.outputs, arguments, six)
         robot = self.model == ROBOT
-        default: Any = force_loops(declare_robot(self)) if robot else ForceLoopParameters()
+        default: Any = force_loops(declare_robot_sheet(self)) if robot else ForceLoopParameters()
         if declare(self, "standby", False, "of several controllers some may command the valve"):
             self.take(SELECTOR_TERMS)
         parameters = declare_tree(self, default, live=LIVE)

@@ -12,9 +12,10 @@ from typing import Any
 import yaml
 
 from emir_analysis.recorded_parameters import OF_A_TOPIC, OF_EVERY_NODE
-from emir_analysis.robot_setup import path_parameters, trajectory
+from emir_analysis.robot_files import FILES, robot_of
+from emir_analysis.robot_setup import path_parameters, trajectory_of
 from emir_analysis.switching import Selector, Switch
-from emir_common.parameter_tree import declared, with_values
+from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_common.version import software_version
 from emir_control.robot_trajectory import RobotTrajectoryInputs
@@ -22,8 +23,7 @@ from emir_control.trajectory import TrajectoryParameters, named
 from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import JOINT1, OFFERED_COMMANDS, ROBOT, TOPICS, VALVE_LOOPS
 from emir_plant.robot import require_pinocchio
-from emir_plant.robot.sheet import robot
-from emir_ros.machines import Start
+from emir_ros.machines import RobotStart
 from emir_ros.run_parameters import WILDCARDS, reaches, read_entries, values_of
 
 CONTROLLERS: dict[str, tuple[str, ...]] = {
@@ -37,7 +37,6 @@ NODES = tuple(dict.fromkeys(  # each once
 ))  # fmt: skip
 MODELS = {JOINT1: TOPICS, ROBOT: ROBOT_TOPICS}
 OF_THE_NODE = ("trajectory", *OF_EVERY_NODE)  # of trajectory_node, but not of its trajectory
-ROBOT_FILES = ("robot_file", "machine_file")
 KNOWN_TO_LINE = ("supply.p0", "geometry.payload", "effects.payload.mass")  # of the robot's plant
 ROBOT_CONTROLLERS = ("cascade", "pfc")
 
@@ -145,33 +144,34 @@ def duration(plan: Plan) -> float:
         for name, value in given_to_node.items()
         if name not in OF_THE_NODE and not name.startswith(OF_A_TOPIC)
     }
-    takes = _robot_trajectory(plan, given, own) if plan.model == ROBOT else _trajectory(plan, own)
+    if plan.model == ROBOT:
+        takes = _robot_duration(plan, given, own)
+    else:
+        takes = _joint1_duration(plan, own)
     return takes if plan.duration is None else plan.duration
 
 
-def _trajectory(plan: Plan, own: dict[str, Any]) -> float:
+def _joint1_duration(plan: Plan, own: dict[str, Any]) -> float:
     """Return how long joint 1's trajectory takes, s."""
     with _told_by(plan, "trajectory_node", own):
         return named(plan.trajectory, with_values(TrajectoryParameters(), own)).duration
 
 
-def _robot_trajectory(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
+def _robot_duration(plan: Plan, given: dict[str, dict[str, Any]], own: dict[str, Any]) -> float:
     """Return how long the robot's trajectory takes, s, from where and with what it is to start."""
     with _told_by(plan, "trajectory_node", own):
-        files = (own.pop(key, "") for key in ROBOT_FILES)
-        sheet = robot(*(Path(str(name)) if name else None for name in files))
+        sheet = robot_of(own)
     plant = given.get("plant_node", {})
     with _told_by(plan, "plant_node", plant):
         main = with_values(sheet.main, {k: v for k, v in plant.items() if k in KNOWN_TO_LINE})
         angles = {k: v for k, v in plant.items() if k.startswith("initial_angles.")}
-        start = RobotTrajectoryInputs(with_values(Start(), angles).initial_angles.angles)
+        start = RobotTrajectoryInputs(with_values(RobotStart(), angles).initial_angles.angles)
         path = with_values(path_parameters(sheet), {"supply": main.supply.p0})
         if own.get("weigh", path.weigh):
             path = with_values(path, {"arm.payload": main.payload})
-    with _told_by(plan, "trajectory_node", own):
-        of_path = {name: own.pop(name) for name in tuple(own) if name in declared(path)}
-        move = with_values(TrajectoryParameters(), own)
-        planned = trajectory(sheet, plan.trajectory, move, with_values(path, of_path))
+    values = {name: value for name, value in own.items() if name not in FILES}
+    with _told_by(plan, "trajectory_node", values):
+        planned = trajectory_of(sheet, plan.trajectory, path, values)
         return planned.initial(start).timing.duration
 
 

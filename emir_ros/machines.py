@@ -8,10 +8,11 @@ from typing import Any, Protocol
 from rclpy.node import Node
 
 from emir_analysis.control_protocols import Signals
+from emir_analysis.node_controls import plant_signals
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import check_ranges, quantity
 from emir_msgs_py.robot_topics import GROUND, ROBOT_VALVE_COMMAND
-from emir_msgs_py.topics import TRUTH, VALVE_COMMAND, Topic
+from emir_msgs_py.topics import VALVE_COMMAND, Topic
 from emir_plant import core
 from emir_plant.boom_urdf import bending, boom_urdf
 from emir_plant.parameters import Machine as JointParameters
@@ -22,10 +23,8 @@ from emir_plant.robot.actuators import SIZE
 from emir_plant.robot.parameters import Robot
 from emir_plant.sensors import measure
 from emir_plant.sheet import joint1, load_sheet
-from emir_ros.node_parameters import declare, declare_robot, declare_tree
+from emir_ros.node_parameters import declare, declare_robot_sheet, declare_tree
 from emir_ros.picture import Picture
-
-TRUTH_SIGNALS = tuple(TRUTH.fields)  # in the order of emir_plant.core.Truth; a test holds that
 
 
 class Machine(Protocol):
@@ -57,6 +56,13 @@ class Joint1Start:
         check_ranges(self)
 
 
+@dataclass(frozen=True, kw_only=True)
+class RobotStart:
+    """Where the robot stands."""
+
+    initial_angles: Posture = Posture()
+
+
 def declare_joint1(node: Node) -> JointParameters:
     """Declare joint 1's file and parameters; return the machine as they set it up."""
     sheet = declare(node, "machine_file", "", "YAML of the machine; empty: EMIR's joint 1")
@@ -65,7 +71,7 @@ def declare_joint1(node: Node) -> JointParameters:
 
 def declare_whole_robot(node: Node) -> Robot:
     """Declare the robot's files and parameters; return it as they set it up."""
-    return declare_tree(node, declare_robot(node), without="main.")
+    return declare_tree(node, declare_robot_sheet(node), without="main.")
 
 
 def robot_description(mechanics: Any) -> str:
@@ -98,7 +104,7 @@ class Joint1Machine:
     def signals(self, tick: int) -> Signals:
         """Return the signals of sensors and truth at a plant period."""
         reading = measure(self.plant, self.truth, tick, self.state)
-        return reading._asdict() | dict(zip(TRUTH_SIGNALS, self.truth, strict=True))
+        return plant_signals(reading, self.truth)
 
     def show(self, stamp: int) -> None:
         """Publish the joints of the description, stamped in ns."""
@@ -127,7 +133,7 @@ class RobotMachine:
         from emir_plant.robot.urdf import joint_positions  # noqa: PLC0415
 
         self._by_signals = robot_machine
-        start = declare_tree(node, Start()).initial_angles
+        start = declare_tree(node, RobotStart()).initial_angles
         self.plant = RobotPlant(declare_whole_robot(node))
         for line in cautions(self.plant.robot.main):
             node.get_logger().warning(line)
@@ -152,10 +158,3 @@ class RobotMachine:
     def show(self, stamp: int) -> None:
         """Publish the joints of the description, stamped in ns."""
         self._picture.publish(stamp)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """Where the robot stands."""
-
-    initial_angles: Posture = Posture()

@@ -5,7 +5,6 @@ from array import array
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -14,6 +13,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from emir_analysis.recorded_parameters import OF_A_TOPIC
+from emir_analysis.robot_files import robot_of
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import ParameterError, Quantity
 from emir_control import pfc_file
@@ -22,7 +22,6 @@ from emir_msgs_py.robot_topics import ROBOT_TOPICS
 from emir_msgs_py.topics import TOPICS
 from emir_plant.plant import SimulationError
 from emir_plant.robot.parameters import Robot
-from emir_plant.robot.sheet import robot
 from emir_ros import qos
 from emir_ros.live_parameters import is_live
 
@@ -65,14 +64,14 @@ def _tell_range(node: Node, name: str, about: Quantity, default: Any) -> None:
         descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
 
 
-def declare_robot(node: Node) -> Robot:
+def declare_robot_sheet(node: Node) -> Robot:
     """Declare the files of the robot's sheet and return what they say.
 
     Raises ParameterError, naming file and key.
     """
     main = declare(node, "machine_file", "", "YAML of the main joint; empty: EMIR's joint 1")
     file = declare(node, "robot_file", "", "YAML of the robot beyond that; empty: EMIR")
-    return robot(Path(file) if file else None, Path(main) if main else None)
+    return robot_of({"robot_file": file, "machine_file": main})
 
 
 def declare_pfc(node: Node, output: str, live: Collection[str] = ()) -> PfcParameters:

@@ -25,7 +25,7 @@ from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.node_parameters import (
     declare,
-    declare_robot,
+    declare_robot_sheet,
     declare_tree,
     naming,
     reject_unknown,
@@ -39,8 +39,7 @@ class TrajectoryNode(ControlNode):
     """cylinder_states -> cylinder_reference, cylinder_preview, cylinder_move.
 
     Of the whole robot: joint_states, cylinder_states -> cylinder_reference, cylinder_preview,
-    tcp_reference. joint_trajectory takes
-    the named trajectory's place.
+    tcp_reference. joint_trajectory takes the named trajectory's place.
     """
 
     law: Guidable
@@ -53,7 +52,7 @@ class TrajectoryNode(ControlNode):
         move = declare_tree(self, TrajectoryParameters())
         with naming(self):
             if self.model == ROBOT:
-                sheet = declare_robot(self)
+                sheet = declare_robot_sheet(self)
                 path = declare_tree(self, path_parameters(sheet))
                 self.law = six(trajectory(sheet, name, move, path))
             else:

@@ -4,7 +4,6 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -89,184 +88,64 @@ def _complain(who: str, message: str) -> int:
 
 def _run(words: list[str]) -> int:
     """Run the graph."""
-    return _hand_over("emir_ros.start", ["run", *words])
+    return _hand_over(["run", *words])
 
 
-def _hand_over(module: str, words: list[str]) -> int:
+def _hand_over(words: list[str]) -> int:
     """Hand over to the one package that knows ROS, in this same process.
 
     -P: what lies in the current folder is not imported.
     """
     if find_spec("rclpy") is None:
         raise InputError("needs ROS 2: source a ROS 2 Jazzy, or pip install 'emir_ros[ros]'")
-    os.execv(sys.executable, [sys.executable, "-P", "-m", module, *words])  # noqa: S606
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "emir_ros.start", *words])  # noqa: S606
 
 
 def _import(words: list[str]) -> int:
-    from emir_analysis.import_command import import_csv
+    from emir_analysis.import_command import command
 
-    parser = argparse.ArgumentParser(
-        prog="emir import",
-        description="A CSV file as a recording that every other command takes (rosbag2, MCAP), by a"
-        " signal map. A blank cell is no sample.",
-    )
-    parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
-    parser.add_argument(
-        "--signals", type=Path, required=True, metavar="FILE",
-        help="signal map, YAML: of each signal column, topic, field, unit; the column of time",
-    )  # fmt: skip
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="BAG", help="folder to write; must not exist"
-    )
-    parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
-    o = parser.parse_args(words)
-    try:
-        rows = None
-        if o.rows is not None:
-            first, behind = (int(n) if n else None for n in o.rows.split(":"))
-            rows = slice(first, behind)
-    except ValueError:
-        raise InputError(f"--rows {o.rows}: not of the form A:B") from None
-    made = import_csv(o.table, o.signals, o.out, rows)
-    left = f"; {made.left_out} messages left out for blank cells" if made.left_out else ""
-    print(f"{o.out}: {made.rows} rows, time {made.start:g} ... {made.end:g} {made.unit}{left}")
+    print(command(words))
     return 0
 
 
 def _info(words: list[str]) -> int:
-    from emir_analysis.info import fields_text, info, parameters_text, text
+    from emir_analysis.info_command import command
 
-    parser = argparse.ArgumentParser(
-        prog="emir info",
-        description="What is in a recording: how it was made, whether it was finished, its topics"
-        " with type, number and rate of messages.",
-    )
-    parser.add_argument("bag", type=Path, metavar="BAG", help="any recording in MCAP")
-    parser.add_argument(
-        "--fields", action="store_true", help="instead: unit and meaning of every field"
-    )
-    parser.add_argument(
-        "--parameters", action="store_true",
-        help="instead: the nodes' parameters, as a ROS parameter file",
-    )  # fmt: skip
-    options = parser.parse_args(words)
-    found = info(options.bag)
-    if options.fields:
-        print(fields_text(found))
-    if options.parameters:
-        print(parameters_text(found))
-    if not (options.fields or options.parameters):
-        print(text(found))
+    print(command(words))
     return 0
 
 
 def _bag(words: list[str]) -> int:
-    from emir_analysis.recover import recover
+    from emir_analysis.bag_command import command
 
-    parser = argparse.ArgumentParser(prog="emir bag", description="Recover a recording.")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    about = "A complete recording of what can be read of one that was cut off or damaged"
-    recovery = commands.add_parser("recover", help=about, description=about)
-    recovery.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
-    recovery.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder to write; must not exist"
-    )
-    options = parser.parse_args(words)
-    saved = recover(options.bag, options.out)
-    for line in saved.damage:
-        _progress(f"emir bag: {line}; what came before it is saved")
-    print(f"{options.out}: {saved.messages} messages over {saved.duration_ns * 1e-9:.3f} s")
+    print(command(words, _progress))
     return 0
 
 
 def _replay(words: list[str]) -> int:
-    import yaml
+    from emir_analysis.replay_command import command
 
-    from emir_analysis.recorded_orders import orders
-    from emir_analysis.replay import NODES, replay, text
-    from emir_analysis.stamped import same
-    from emir_common.yaml_file import read_value
-
-    parser = argparse.ArgumentParser(
-        prog="emir replay",
-        description="Give the recorded inputs to what one node computes, and compare its answers"
-        " with the recorded ones, bit by bit. Exit code 1 where they differ.",
-    )
-    parser.add_argument(
-        "bag", type=Path, metavar="BAG", help="a recording of the graph, made in lock step"
-    )
-    parser.add_argument("--node", required=True, metavar="NAME", help=f"one of {', '.join(NODES)}")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="PARAM=VALUE",
-        help="with this parameter of the node: how far the answers are then from the recorded ones,"
-        " the inputs being the same (open loop); may be repeated",
-    )  # fmt: skip
-    options = parser.parse_args(words)
-    changed = {}
-    for entry in options.set:
-        name, equals, value = entry.partition("=")
-        if not equals:
-            raise InputError(f"--set {entry}: not of the form PARAM=VALUE")
-        try:
-            changed[name] = read_value(value)
-        except yaml.YAMLError:
-            raise InputError(f"--set {entry}: {value} is not a value") from None
-    fields = replay(options.bag, options.node, changed)
-    for order in orders(options.bag, f"{options.node}_node"):
-        print(order.line)
-    print(text(fields, changed))
-    return 0 if changed or same(fields) else 1
+    told, is_same = command(words)
+    print(told)
+    return 0 if is_same else 1
 
 
 def _view(words: list[str]) -> int:
     from emir_analysis.view.command import command
 
-    return command(words, lambda arguments: _hand_over("emir_ros.start", ["view_node", *arguments]))
+    return command(words, lambda arguments: _hand_over(["view_node", *arguments]))
 
 
 def _analyze(words: list[str]) -> int:
-    from emir_analysis import run_report
-    from emir_analysis.outputs import check_outputs, write_all
+    from emir_analysis.analyze_command import command
 
-    parser = argparse.ArgumentParser(
-        prog="emir analyze",
-        description="Figures of recordings of the graph: tracking error, lag, deflection,"
-        " pressures. Several recordings stand side by side.",
-    )
-    parser.add_argument(
-        "bag", type=Path, nargs="+", metavar="BAG", help="recordings of the graph, of one model"
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
-    parser.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write the figures, one line for each recording"
-    )
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with plots")
-    parser.add_argument(
-        "--picture", type=Path, metavar="FILE",
-        help="of the whole robot: draw the way of its TCP",
-    )  # fmt: skip
-    options = parser.parse_args(words)
-    writes = [
-        (options.json, run_report.write_json),
-        (options.csv, run_report.write_csv),
-        (options.html, run_report.write_report),
-        (options.picture, run_report.write_path),
-    ]
-    check_outputs([file for file, _ in writes], None, options.bag)
-    runs = [run_report.analyze(bag) for bag in options.bag]
-    run_report.check_alike(runs)
-    print(run_report.text(runs[0]) if len(runs) == 1 else run_report.comparison(runs))
-    failed = write_all((file, partial(write, runs)) for file, write in writes)
-    if failed:
-        raise IncompleteError(runs, failed)
-    return 0
+    return _said(str, lambda: command(words))
 
 
 def _compare(words: list[str]) -> int:
-    from emir_analysis.compare_command import command, parser
+    from emir_analysis.compare_command import command
 
-    options = parser().parse_args(words)
-    return _said(str, lambda: command(options, _progress))
+    return _said(str, lambda: command(words, _progress))
 
 
 def _limit(words: list[str]) -> int:
@@ -299,7 +178,7 @@ def _design(words: list[str]) -> int:
 
 def _bench(words: list[str]) -> int:
     if words[:1] == ["graph"]:
-        return _hand_over("emir_ros.start", ["bench", *words[1:]])
+        return _hand_over(["bench", *words[1:]])
     if words[:1] == ["diagnosis"]:
         from emir_analysis.bench import identification
 
@@ -336,26 +215,9 @@ def _linearize(words: list[str]) -> int:
 
 
 def _figures(words: list[str]) -> int:
-    from emir_analysis.paper_figures import FIGURES, draw
+    from emir_analysis.figures_command import command
 
-    everything = ",".join(map(str, FIGURES))
-    parser = argparse.ArgumentParser(
-        prog="emir figures",
-        description="The paper's figures as this machine draws them, and a table (table.md,"
-        " table.json) of the paper's numbers beside ours, measured anew.",
-    )
-    parser.add_argument(
-        "--only", default=everything, metavar="N,N", help=f"these figures; default {everything}"
-    )
-    folder = parser.add_mutually_exclusive_group(required=True)
-    folder.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="where to write")
-    folder.add_argument("--out", type=Path, metavar="DIR", help="the same, as an option")
-    options = parser.parse_args(words)
-    numbers = options.only.split(",")
-    if not all(number.isdecimal() for number in numbers):
-        raise InputError(f"--only {options.only}: not numbers with commas between")
-    for file in draw([int(number) for number in numbers], options.folder or options.out, _progress):
-        print(file)
+    print(command(words, _progress))
     return 0
 
 
@@ -443,9 +305,9 @@ def _blind(words: list[str]) -> int:
 
 
 def _urdf(words: list[str]) -> int:
-    from emir_analysis.urdf_command import command, parser
+    from emir_analysis.urdf_command import command
 
-    print(command(parser().parse_args(words)))
+    print(command(words))
     return 0
 
 

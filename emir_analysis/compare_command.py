@@ -1,7 +1,7 @@
 """`emir compare`: every controller on the same moves, as one table and one picture."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,8 +34,7 @@ MODES = {  # and what they have no use for
 Progress = Callable[[str], None]
 
 
-def parser() -> ArgumentParser:
-    """Return the command's options."""
+def _parser() -> ArgumentParser:
     about = (
         "Every controller on the same moves of the nonlinear machine. Without --angle, --payload,"
         " --size and --error: a grid of 36 cases (45 and 60 deg; 0, 750 and 1500 kg; 20 and"
@@ -92,12 +91,13 @@ def parser() -> ArgumentParser:
     return options
 
 
-def command(options: Namespace, progress: Progress) -> str:
+def command(words: Sequence[str], progress: Progress) -> str:
     """Run, draw, return the tables.
 
     Raises InputError or ParameterError; IncompleteError, with the tables, where the machine cannot
     do some of the cases.
     """
+    options = _parser().parse_args(words)
     check_outputs([options.picture, options.csv], None, [options.pfc, options.pfc_tip])
     check_picture(options.picture)
     for mode, usual in MODES.items():

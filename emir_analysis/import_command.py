@@ -12,6 +12,8 @@ Without a time the rows are samples; a sample stands in the recording as one sec
 import json
 import math
 import re
+from argparse import ArgumentParser
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,6 +74,44 @@ class Imported:
     end: float
     unit: str
     left_out: int
+
+
+def command(words: Sequence[str]) -> str:
+    """Import, return what was written. Raises InputError or ParameterError."""
+    options = _parser().parse_args(words)
+    made = import_csv(options.table, options.signals, options.out, _rows(options.rows))
+    left = f"; {made.left_out} messages left out for blank cells" if made.left_out else ""
+    times = f"time {made.start:g} ... {made.end:g} {made.unit}"
+    return f"{options.out}: {made.rows} rows, {times}{left}"
+
+
+def _rows(text: str | None) -> slice | None:
+    """Return the rows that A:B means; None: all."""
+    if text is None:
+        return None
+    try:
+        first, behind = (int(n) if n else None for n in text.split(":"))
+    except ValueError:
+        raise InputError(f"--rows {text}: not of the form A:B") from None
+    return slice(first, behind)
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(
+        prog="emir import",
+        description="A CSV file as a recording that every other command takes (rosbag2, MCAP), by a"
+        " signal map. A blank cell is no sample.",
+    )
+    parser.add_argument("table", type=Path, metavar="CSV", help="its first line names the columns")
+    parser.add_argument(
+        "--signals", type=Path, required=True, metavar="FILE",
+        help="signal map, YAML: of each signal column, topic, field, unit; the column of time",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="BAG", help="folder to write; must not exist"
+    )
+    parser.add_argument("--rows", metavar="A:B", help="from row A (the first is 0) up to before B")
+    return parser
 
 
 def import_csv(table: Path, signals: Path, out: Path, rows: slice | None = None) -> Imported:

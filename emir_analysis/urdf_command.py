@@ -1,6 +1,7 @@
 """`emir urdf`: the robot's description as a file."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from emir_analysis.outputs import check_outputs, write_text
@@ -8,8 +9,7 @@ from emir_plant.robot import require_pinocchio
 from emir_plant.robot.sheet import robot
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the command's options."""
+def _parser() -> argparse.ArgumentParser:
     about = "The whole robot as URDF: every joint, linkage part and cut. Needs the extra `robot`."
     options = argparse.ArgumentParser(prog="emir urdf", description=about)
     options.add_argument("file", type=Path, metavar="FILE", help="URDF to write")
@@ -20,11 +20,12 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
-def command(options: argparse.Namespace) -> str:
+def command(words: Sequence[str]) -> str:
     """Write the file, read it back with Pinocchio, and return what is in it.
 
     Raises InputError where it cannot be written, ParameterError for a bad sheet.
     """
+    options = _parser().parse_args(words)
     require_pinocchio()
     import pinocchio as pin  # noqa: PLC0415 (an extra)
 

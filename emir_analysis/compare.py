@@ -16,6 +16,7 @@ from emir_analysis.node_controls import CascadeControl, PfcControl, PfcTipContro
 from emir_analysis.report import new_figure
 from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import with_values
+from emir_common.quantity import ParameterError
 from emir_control import pfc_file
 from emir_control.limits import LimitParameters
 from emir_control.pfc import PREVIEW, Future
@@ -53,6 +54,14 @@ def controllers(
     return loops
 
 
+def select(known: dict[str, Stepping], names: list[str] | None) -> dict[str, Stepping]:
+    """Return the controllers of these names, or all; raises ParameterError for an unknown one."""
+    for name in names or ():
+        if name not in known:
+            raise ParameterError(f"controller {name!r}: there are {'; '.join(known)}")
+    return {name: known[name] for name in names or known}
+
+
 @dataclass(frozen=True)
 class MoveFigures:
     """Figures of one move of a run; deflections are dynamic, off the sag of the posture.
@@ -77,6 +86,11 @@ class MoveFigures:
     settling: float
     travel: float
     oil: float
+
+    @property
+    def bending(self) -> float:
+        """Return the largest deflection during the move, m, whichever way."""
+        return max(self.up, -self.down)
 
 
 def repeated(

@@ -5,14 +5,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from emir_analysis import compare_grid, damping, trade_off, yardstick
-from emir_analysis.compare import Run, as_text, controllers, picture, repeated
+from emir_analysis.compare import Run, as_text, controllers, picture, repeated, select
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.errors import IncompleteError, InputError
-from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.outputs import check_outputs, check_picture, write_picture
 from emir_analysis.unused_options import check_unused
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
@@ -105,14 +103,14 @@ def command(words: Sequence[str], progress: Progress) -> str:
             check_unused(options, usual, f"not with --{mode.replace('_', '-')}")
     if options.damping:
         if options.picture:
-            save(damping.picture(joint1()), options.picture)
+            write_picture(options.picture, damping.picture(joint1()))
         return damping.as_text(joint1())
     if options.trade_off:
         others = select(_known(options), options.controllers)
         others.pop("cascade", None)
         curve = trade_off.curve(joint1(), others, progress)
         if options.picture:
-            save(trade_off.picture(curve), options.picture)
+            write_picture(options.picture, trade_off.picture(curve))
         return trade_off.as_text(curve)
     chosen = select(_known(options), options.controllers)
     cases = _cases(options)
@@ -158,7 +156,7 @@ def _grid(
         raise InputError("--repeat is for one case: a grid varies enough")
     found, left_out = compare_grid.results(joint1(), chosen, cases, progress, options.trajectory)
     if options.picture:
-        save(compare_grid.picture(found), options.picture)
+        write_picture(options.picture, compare_grid.picture(found))
     if options.csv:
         compare_grid.write_csv(found, options.csv)
     count = len({result.case for result in found})
@@ -168,14 +166,6 @@ def _grid(
         told = f"{len(left_out)} of {len(cases)} cases left out; the first: {left_out[0]}"
         raise IncompleteError(text, [InputError(told)])
     return text
-
-
-def select(known: dict[str, Stepping], names: list[str] | None) -> dict[str, Stepping]:
-    """Return the controllers of these names, or all; raises ParameterError for an unknown one."""
-    for name in names or ():
-        if name not in known:
-            raise ParameterError(f"controller {name!r}: there are {'; '.join(known)}")
-    return {name: known[name] for name in names or known}
 
 
 def _one(chosen: dict[str, Stepping], case: Case, options: Namespace, progress: Progress) -> str:
@@ -194,13 +184,5 @@ def _one(chosen: dict[str, Stepping], case: Case, options: Namespace, progress: 
     except SimulationError as error:
         raise InputError(f"{title}: {error}") from None
     if options.picture:
-        save(picture({name: found[0] for name, found in runs.items()}), options.picture)
+        write_picture(options.picture, picture({name: found[0] for name, found in runs.items()}))
     return f"{title}\n\n{as_text(runs)}"
-
-
-def save(figure: Figure, file: Path) -> None:
-    """Write a picture; raises InputError, naming the file."""
-    try:
-        figure.savefig(file, dpi=120)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: {error}") from None

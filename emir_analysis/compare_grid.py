@@ -19,6 +19,7 @@ from emir_analysis.control_protocols import Stepping
 from emir_analysis.design_pfc import OperatingPoint
 from emir_analysis.errors import InputError
 from emir_analysis.margin import gain_margin, linear_machine
+from emir_analysis.outputs import written
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import declared, with_values
 from emir_common.quantity import quantities
@@ -81,11 +82,6 @@ class Result:
     direction: str
     figures: MoveFigures
     margin: float
-
-    @property
-    def bending(self) -> float:
-        """Return the largest dynamic deflection during the move, m."""
-        return max(self.figures.up, -self.figures.down)
 
 
 def results(
@@ -152,7 +148,7 @@ COLUMNS: tuple[tuple[str, Callable[[Result], float]], ...] = (
     ("error rms / mm", lambda r: r.figures.error_rms * 1e3),
     ("error peak / mm", lambda r: r.figures.error * 1e3),
     ("lag / s", lambda r: r.figures.lag),
-    ("bending / cm", lambda r: r.bending * 1e2),
+    ("bending / cm", lambda r: r.figures.bending * 1e2),
     ("1 s after / cm", lambda r: r.figures.settled * 1e2),
     ("settling / s", lambda r: r.figures.settling),
     ("dv/dt / mm/s2", lambda r: r.figures.roughness * 1e3),
@@ -216,10 +212,10 @@ CLAIMS = (
     ),
     Claim(
         "PFC of the joint bends the boom less than conventional control",
-        "pfc, preview", "cascade", lambda r: r.bending,
+        "pfc, preview", "cascade", lambda r: r.figures.bending,
     ),
     Claim(
-        "The same, scheduled", "pfc, scheduled", "cascade", lambda r: r.bending,
+        "The same, scheduled", "pfc, scheduled", "cascade", lambda r: r.figures.bending,
     ),
     Claim(
         "PFC that follows the load leaves less 1 s after the stop than the one made empty",
@@ -227,11 +223,11 @@ CLAIMS = (
     ),
     Claim(
         "PFC of the tip bends the boom less than PFC of the joint, lifting",
-        "pfc_tip, preview", "pfc, preview", lambda r: r.bending, ("lift",),
+        "pfc_tip, preview", "pfc, preview", lambda r: r.figures.bending, ("lift",),
     ),
     Claim(
         "The same, scheduled",
-        "pfc_tip, scheduled", "pfc, scheduled", lambda r: r.bending, ("lift",),
+        "pfc_tip, scheduled", "pfc, scheduled", lambda r: r.figures.bending, ("lift",),
     ),
     Claim(
         "PFC of the tip leaves less 1 s after the stop than PFC of the joint",
@@ -313,16 +309,13 @@ def write_csv(found: Sequence[Result], file: Path) -> None:
             "move": r.direction,
         }
         | asdict(r.figures)
-        | {"bending": r.bending, "gain_margin": r.margin}
+        | {"bending": r.figures.bending, "gain_margin": r.margin}
         for r in found
     ]
-    try:
-        with file.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
+    with written(file), file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def grid(axes: Mapping[str, Sequence[Any]]) -> list[Case]:

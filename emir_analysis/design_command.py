@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from emir_analysis import design_lqg
-from emir_analysis.compare_command import save
 from emir_analysis.design_pfc import (
     ANGLES,
     ORDERS,
@@ -24,7 +23,7 @@ from emir_analysis.design_pfc import (
 )
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, from_recording
-from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.outputs import check_outputs, check_picture, write_picture
 from emir_analysis.unused_options import check_unused
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
@@ -96,7 +95,7 @@ def _pfc(options: Namespace, progress: Callable[[str], None], *, recorded: bool)
     progress("stability over posture and payload")
     found = stability_map(machine, options.controller, parameters)
     if options.picture:
-        save(picture(found), options.picture)
+        write_picture(options.picture, picture(found))
     stable = "stable everywhere" if found.worst < 1.0 else "NOT stable everywhere (!)"
     return (
         f"{options.out}: {options.controller} of order {parameters.model.order}; {stable}\n"

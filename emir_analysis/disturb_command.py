@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.compare import Run
-from emir_analysis.compare_command import save, select
+from emir_analysis.compare import Run, select
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.disturbance import LoadChange, push
 from emir_analysis.limit import PAPER_MOVE
-from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.outputs import check_outputs, check_picture, write_picture
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import EVERYDAY, controllers, turned_off
 from emir_common.parameter_tree import with_values
@@ -97,7 +96,7 @@ def command(words: Sequence[str], progress: Progress) -> str:
             bendings.setdefault(case.name, {})[name] = bending
             lines.append(f"| {case.name} | {name} | {' | '.join(_cells(case, bending, off))} |")
     if options.picture:
-        save(picture(bendings), options.picture)
+        write_picture(options.picture, picture(bendings))
     return "\n".join(lines)
 
 

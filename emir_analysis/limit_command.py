@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from emir_analysis.compare_command import save
 from emir_analysis.limit import PAPER_MOVE, Move, least, turn
-from emir_analysis.outputs import check_outputs, check_picture
+from emir_analysis.outputs import check_outputs, check_picture, write_picture
 from emir_analysis.report import new_figure
 from emir_common.parameter_tree import with_values
 from emir_control.least_bending import STEP, Motion
@@ -27,7 +26,7 @@ def command(words: Sequence[str]) -> str:
     found = least(machine, move)
     if options.picture:
         arm = move.stroke / turn(machine, move)
-        save(picture(found, arm), options.picture)
+        write_picture(options.picture, picture(found, arm))
     return (
         f"{options.angle:g} deg, {options.payload:g} kg, {options.stroke:g} mm in"
         f" {options.duration:g} s: no command bends the boom by less than"

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from matplotlib.backend_bases import FigureCanvasBase
+from matplotlib.figure import Figure
 
 from emir_analysis.errors import InputError
 from emir_common.quantity import ParameterError
@@ -65,6 +66,15 @@ def write_text(file: Path, text: str) -> None:
     """Write a text in UTF-8. Raises InputError, naming the file."""
     with written(file):
         file.write_text(text, encoding="utf-8")
+
+
+def write_picture(file: Path, figure: Figure) -> None:
+    """Draw a figure, its kind by the file's name. Raises InputError, naming the file."""
+    with written(file):
+        try:
+            figure.savefig(file, dpi=120)
+        except ValueError as error:  # no kind of picture
+            raise InputError(f"{file}: {error}") from None
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from emir_analysis import compare, figure_boom, figure_flow, figure_steps, paper_table
 from emir_analysis.errors import InputError
 from emir_analysis.figure_steps import StepResponses
-from emir_analysis.outputs import written
+from emir_analysis.outputs import write_picture, written
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.parameters import Machine
 from emir_plant.sheet import even_edges, joint1
@@ -41,8 +41,7 @@ def draw(only: Sequence[int], folder: Path, progress: Callable[[str], None]) -> 
     for number in only:
         progress(f"figure {number}: {FIGURES[number]}")
         files.append(folder / f"figure_{number:02}.png")
-        with written(files[-1]):
-            _figure(number, machine, steps).savefig(files[-1], dpi=120)
+        write_picture(files[-1], _figure(number, machine, steps))
     return files + paper_table.write(paper_table.measure(machine, steps, progress), folder)
 
 

@@ -142,7 +142,7 @@ def _limit(machine: Machine) -> float:
 
 
 def _bent(moves: list[MoveFigures]) -> float:
-    return max(max(move.up, -move.down) for move in moves)
+    return max(move.bending for move in moves)
 
 
 def _rough(moves: list[MoveFigures]) -> float:

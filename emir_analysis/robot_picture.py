@@ -1,14 +1,12 @@
 """The way of the robot's TCP as a picture: planned, measured, and how far apart over time."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from emir_analysis.errors import InputError
 from emir_analysis.report import new_figure
 from emir_analysis.robot_metrics import path_error, reference, tcp, tcp_error, tilt
 from emir_analysis.run_plots import COLORS, WANTED
@@ -32,10 +30,7 @@ def path_picture(runs: Mapping[str, Recording]) -> Figure:
         def side(places: Array, start: Array = start, ahead: Array = ahead) -> tuple[Array, Array]:
             return (places[:, :2] - start) @ ahead, places[:, 2]
 
-        for view, seen in (
-            ("s", side),
-            ("a", _above),
-        ):
+        for view, seen in (("s", side), ("a", _above)):
             planned, way = f"{label}planned", seen(reference(run))
             axes[view].plot(*way, "--", color=WANTED, linewidth=2.5, label=planned)
             axes[view].plot(*seen(tcp(run)), color=color, label=f"{label}measured")
@@ -47,16 +42,6 @@ def path_picture(runs: Mapping[str, Recording]) -> Figure:
         axes["t"].plot(time, 1e3 * tilt(run), color=color)
     _name(axes)
     return figure
-
-
-def write_picture(runs: Mapping[str, Recording], file: Path) -> None:
-    """Write the picture, its kind by the file's name. Raises InputError when that fails."""
-    try:
-        path_picture(runs).savefig(file, dpi=120)
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}") from None
-    except ValueError as error:  # no kind of picture
-        raise InputError(f"{file}: {error}") from None
 
 
 def _above(places: Array) -> tuple[Array, Array]:

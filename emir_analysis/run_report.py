@@ -11,10 +11,10 @@ from typing import Any
 from emir_analysis import bags
 from emir_analysis.errors import InputError
 from emir_analysis.metrics import Metric, metrics
-from emir_analysis.outputs import write_text, written
+from emir_analysis.outputs import write_picture, write_text, written
 from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
 from emir_analysis.robot_metrics import robot_metrics
-from emir_analysis.robot_picture import write_picture
+from emir_analysis.robot_picture import path_picture
 from emir_analysis.robot_report import headline as robot_headline
 from emir_analysis.robot_report import robot_plots
 from emir_analysis.run_plots import HYDRAULICS, MOTION, plot
@@ -128,7 +128,8 @@ def write_path(runs: Sequence[RunAnalysis], file: Path) -> None:
     """Write the picture of the robot's TCP on its way. Raises InputError for runs of joint 1."""
     if not is_robot(runs[0].recording):
         raise InputError("--picture: is of the whole robot, this is a run of joint 1")
-    write_picture(dict(zip(_names(runs), (run.recording for run in runs), strict=True)), file)
+    recordings = (run.recording for run in runs)
+    write_picture(file, path_picture(dict(zip(_names(runs), recordings, strict=True))))
 
 
 def _names(runs: Sequence[RunAnalysis]) -> list[str]:

@@ -68,7 +68,7 @@ def _tuning(
         slow,
         error=max(m.error for m in moves),
         lag=max((m.lag for m in moves), key=abs),
-        bending=max(max(m.up, -m.down) for m in moves),
+        bending=max(m.bending for m in moves),
         settled=max(m.settled for m in moves),
     )
 

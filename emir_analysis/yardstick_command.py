@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from emir_analysis.compare_command import save, select
-from emir_analysis.outputs import check_outputs, check_picture, write_text
+from emir_analysis.compare import select
+from emir_analysis.outputs import check_outputs, check_picture, write_picture, write_text
 from emir_analysis.report import new_figure
 from emir_analysis.yardstick import (
     AIM_HARD,
@@ -63,7 +63,7 @@ def command(words: Sequence[str], progress: Progress) -> str:
         shown = ", ".join(f"{name} {found[-1].ratio:.2f}" for name, found in scores.items())
         progress(f"draw {len(done)} of {options.draws}: R of {shown}")
     if options.picture:
-        save(picture(scores, done, aim), options.picture)
+        write_picture(options.picture, picture(scores, done, aim))
     if options.json:
         _write(options.json, as_numbers(scores, done, options))
     return as_text(scores, aim)

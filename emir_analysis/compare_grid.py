@@ -134,9 +134,7 @@ def _margins(case: Case, base: Machine, outer: Stepping) -> dict[str, float]:
     """Return the gain margin of each direction; nan where the machine has no such slow motion."""
     found = {}
     for way, velocity in (("lift", 0.01), ("lower", -0.01)):
-        point = OperatingPoint(
-            angle=math.radians(case.angle), payload=case.payload, velocity=velocity
-        )
+        point = OperatingPoint(angle=case.start, payload=case.payload, velocity=velocity)
         try:
             found[way] = gain_margin(linear_machine(case.machine(base), point), outer)
         except SimulationError:

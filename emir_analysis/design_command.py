@@ -7,23 +7,19 @@ from pathlib import Path
 
 from emir_analysis import design_lqg
 from emir_analysis.design_pfc import (
-    ANGLES,
     ORDERS,
     OUTPUTS,
-    PAYLOADS,
     DesignTask,
     OperatingPoint,
-    as_text,
     design_pfc,
     designed,
-    picture,
     scheduled,
-    stability_map,
     velocity_model,
 )
 from emir_analysis.errors import InputError
 from emir_analysis.identify import difference, from_recording
 from emir_analysis.outputs import check_outputs, check_picture, write_picture
+from emir_analysis.stability_map import ANGLES, PAYLOADS, as_text, picture, stability_map
 from emir_analysis.unused_options import check_unused
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError

@@ -27,7 +27,7 @@ METHODS: dict[str, Callable[[Linear, int], Linear]] = {
     "modal": reduction.modal,
 }
 ORDERS = (6, 8)  # paper 2.3
-FULL = "linear"  # name of the model that is not reduced
+FULL, NONLINEAR = "linear", "nonlinear"  # names beside the reduced models
 FREQUENCIES = np.geomspace(0.02, 20.0, 400)  # Hz
 UP_TO = (1.0, 2.0, 5.0)  # Hz, up to which the largest error is told
 TICK, DURATION = 5e-3, 3.0  # s, of the step response
@@ -77,9 +77,6 @@ class DesignModels:
         k = self.outputs.index(output)
         wanted = self.step[NONLINEAR][k]
         return float(np.sqrt(np.mean((self.step[name][k] - wanted) ** 2)) / abs(wanted).max())
-
-
-NONLINEAR = "nonlinear"
 
 
 def linear(plant: Plant, point: Point, outputs: Sequence[str]) -> Linear:

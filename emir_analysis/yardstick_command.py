@@ -38,6 +38,7 @@ FIGURES = (  # field, title, factor to the unit shown
     ("position", "TCP error / cm", 100.0),
     ("taken", "time 2-98 % / s", 1.0),
 )
+SHOWN = 5.0  # largest R in the picture
 
 
 def command(words: Sequence[str], progress: Progress) -> str:
@@ -170,9 +171,6 @@ def picture(scores: Scores, done: Sequence[tuple[Draw, float]], aim: float) -> F
     for axes in (ordered, spread):
         axes.grid(visible=True, alpha=0.3)
     return figure
-
-
-SHOWN = 5.0  # largest R in the picture
 
 
 def _write(file: Path, content: dict[str, Any]) -> None:

@@ -13,11 +13,11 @@ from emir_analysis.design_pfc import (
     DesignTask,
     OperatingPoint,
     design_pfc,
-    stability_map,
     steady_motion,
     velocity_model,
 )
 from emir_analysis.node_controls import PfcControl
+from emir_analysis.stability_map import stability_map
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file

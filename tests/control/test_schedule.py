@@ -9,16 +9,14 @@ import pytest
 
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.design_pfc import (
-    ANGLES,
     ORDERS,
-    PAYLOADS,
     DesignTask,
     OperatingPoint,
     design_pfc,
     pump_is_short,
-    stability_map,
 )
 from emir_analysis.node_controls import PfcControl, PfcTipControl
+from emir_analysis.stability_map import ANGLES, PAYLOADS, stability_map
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_control import pfc_file
@@ -155,10 +153,9 @@ def test_the_heavy_and_steep_corner_is_stable_with_it_and_comes_to_rest() -> Non
 
 def test_map_of_the_schedule_between_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the pump is all but short of pressure, too: 30 to 38 deg with 1250 kg."""
-    from emir_analysis import design_pfc
-
-    monkeypatch.setattr(design_pfc, "FINE_ANGLES", tuple(np.radians([30.0, 37.5, 75.0])))
-    monkeypatch.setattr(design_pfc, "FINE_PAYLOADS", (0.0, 1250.0))
+    angles = tuple(np.radians([30.0, 37.5, 75.0]))
+    monkeypatch.setattr("emir_analysis.stability_map.FINE_ANGLES", angles)
+    monkeypatch.setattr("emir_analysis.stability_map.FINE_PAYLOADS", (0.0, 1250.0))
     tip = pfc_file.load(pfc_file.find(SCHEDULED, TIP_ANGLE), TIP_ANGLE)
     for controller, parameters in (("pfc", GIVEN), ("pfc_tip", tip)):
         found = stability_map(joint1(), controller, parameters)

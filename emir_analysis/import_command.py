@@ -28,6 +28,7 @@ from emir_analysis.info import FIELDS
 from emir_analysis.rosbag2_writer import Rosbag2Writer, channel_metadata
 from emir_analysis.signals import TIME, Array, Source, read_signal_map
 from emir_common.yaml_file import read_map
+from emir_msgs_py.conversions import NANOSECONDS
 from emir_msgs_py.definitions import DEFINITIONS, FLOAT64, HASHES
 from emir_msgs_py.topics import FLUID_PRESSURE, JOINT_STATE
 
@@ -44,11 +45,10 @@ UNITS = {  # a column's unit -> SI unit, factor
 }  # fmt: skip
 ARRAYS = ("position", "velocity", "effort")  # of a JointState
 _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _SYSTEM_DEFAULT = [
-    {"history": 3, "depth": 0, "reliability": 1, "durability": 2,
-     "deadline": {"sec": 9223372036, "nsec": 854775807},
-     "lifespan": {"sec": 9223372036, "nsec": 854775807},
-     "liveliness": 1, "liveliness_lease_duration": {"sec": 9223372036, "nsec": 854775807},
+    {"history": 3, "depth": 0, "reliability": 1, "durability": 2, "deadline": _FOREVER,
+     "lifespan": _FOREVER, "liveliness": 1, "liveliness_lease_duration": _FOREVER,
      "avoid_ros_namespace_conventions": False}
 ]  # fmt: skip
 
@@ -287,7 +287,7 @@ def _step(source: Source) -> tuple[str, int | None]:
 def _message(kind: str, stamp: int, names: list[str], fields: dict[str, float]) -> dict[str, Any]:
     if kind == FLOAT64:
         return {"data": fields["data"]}
-    seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+    seconds, nanoseconds = divmod(stamp, NANOSECONDS)
     header = {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": ""}
     if kind == FLUID_PRESSURE:
         return {"header": header, "fluid_pressure": fields["fluid_pressure"], "variance": 0.0}

@@ -54,9 +54,7 @@ class RobotTrajectoryControl:
         """Return the next state and the reference of this period."""
         angles, forces = _six(signals, "angle"), _six(signals, "force")
         inputs = RobotTrajectoryInputs(angles, forces)
-        if (
-            state is None and not np.isfinite([angles, forces]).all()
-        ):  # begins with the first numbers
+        if state is None and not np.isfinite([angles, forces]).all():  # begins with the first ones
             return None, {name: math.nan for topic in self.outputs for name in topic.fields}
         state = state or self.trajectory.initial(inputs)
         ahead = self.trajectory.ahead(state, PREVIEW, dt)

@@ -109,10 +109,10 @@ class RecorderNode(Shell):
             self._record(topic)
         self._described = not any(nodes)
         self._answers: dict[str, dict[str, Any]] = {}
-        self._shape: str | None = None if PLANT in nodes else ""
+        self._urdf: str | None = None if PLANT in nodes else ""  # None: still to come
         if not self._described:
             ParameterRecord(self, nodes, self._on_answers)
-        self.create_subscription(String, DESCRIPTION, self._on_shape, qos.latched())
+        self.create_subscription(String, DESCRIPTION, self._on_urdf, qos.latched())
         self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
@@ -225,10 +225,10 @@ class RecorderNode(Shell):
         self._answers = answers
         self._describe()
 
-    def _on_shape(self, message: String) -> None:
-        first, self._shape = not self._shape, message.data
+    def _on_urdf(self, message: String) -> None:
+        first, self._urdf = not self._urdf, message.data
         if first and self._described:
-            self._attach_shape()
+            self._attach_urdf()
         elif first:
             self._describe()
 
@@ -237,7 +237,7 @@ class RecorderNode(Shell):
 
         In lock step nothing is written before, so that every recording is the same.
         """
-        if not self._answers or self._shape is None:
+        if not self._answers or self._urdf is None:
             return
         with self._watched():
             self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
@@ -246,8 +246,8 @@ class RecorderNode(Shell):
                 self._writer.add_metadata(MACHINE, machine)
             for name, values in self._answers.items():
                 self._attach_files(name, values)
-        if self._shape:
-            self._attach_shape()
+        if self._urdf:
+            self._attach_urdf()
         self._described = True
         self._write_complete_stamps()
 
@@ -258,8 +258,8 @@ class RecorderNode(Shell):
         except ParameterError as error:
             self.diagnostics.say(Level.WARN, f"not in the recording: {error}")
 
-    def _attach_shape(self) -> None:
-        data = (self._shape or "").encode()
+    def _attach_urdf(self) -> None:
+        data = (self._urdf or "").encode()
         with self._watched():
             self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
 

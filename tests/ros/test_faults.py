@@ -160,7 +160,7 @@ def test_a_jump_of_the_clock_shuts_the_valve_until_inputs_are_new(bench: Bench, 
     before = len(bench.valve)
     for _ in range(8):
         bench.tick([])
-    assert len(bench.valve) > before
+    assert len(bench.valve) > before + 1
     assert not any(bench.valve[before + 1 :])
     bench.settle()
     assert bench.valve[-1] > 0.0

@@ -13,8 +13,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core
-from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, STEP, Array
+from emir_plant import core, integration
+from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, Array
 from emir_plant.jit import compiled_in_place, compiled_parallel
 from emir_plant.lane import lane
 from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
@@ -23,22 +23,22 @@ LANES = 8  # doubles in the widest registers there are
 STAGES = ("k1", "k2", "k3", "k4", "between")
 
 
-def simulate_many(  # noqa: PLR0913, PLR0917 (as core.simulate)
+def simulate_many(  # noqa: PLR0913, PLR0917 (as integration.simulate)
     starts: Array,
     commands: Array,
     dt: float,
     every: int,
     parameters: NDArray[Any],
-    step: float = STEP,
+    step: float = integration.STEP,
 ) -> Array:
     """Run m machines under the same commands, on all cores.
 
     starts: (m, n) states; commands: (k,), each held for dt, s; parameters: (m,) records;
     step: s, the longest of the integration. Returns (m, 1 + k // every, len(Truth)) as
-    `core.simulate` gives it for each, bit by bit.
+    `integration.simulate` gives it for each, bit by bit.
     """
     if len(starts) < LANES or any(parameters[name].any() for name in EFFECT_SIZES):
-        return core.simulate_each(starts, commands, dt, every, parameters, step)
+        return integration.simulate_each(starts, commands, dt, every, parameters, step)
     found = _simulate(_side_by_side(starts, parameters), commands, dt, every, step)
     return found[: len(starts)]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core, linkage
+from emir_plant import core, integration, linkage
 from emir_plant.core import Array, Truth
 from emir_plant.effects import backlash, command_delay, external_load, linkage_error
 from emir_plant.hydraulics import logic_block
@@ -108,11 +108,11 @@ class Plant:
 
         The command is limited to [-1, 1]. Raises SimulationError when the state is not finite.
         """
-        after, shown = core.step(state, min(max(command, -1.0), 1.0), dt, self.record)
+        after, shown = integration.step(state, min(max(command, -1.0), 1.0), dt, self.record)
         if not math.isfinite(shown.force + shown.stroke + shown.velocity + shown.spool):
             raise SimulationError(f"the state is not finite after a step with y2 = {command!r}")
         return after, shown
 
     def simulate(self, state: Array, commands: Array, dt: float, every: int = 1) -> Array:
         """Return the truth, (1 + k // every, 12), over k commands, each held for dt, s."""
-        return core.simulate(state, np.clip(commands, -1.0, 1.0), dt, every, self.record)
+        return integration.simulate(state, np.clip(commands, -1.0, 1.0), dt, every, self.record)

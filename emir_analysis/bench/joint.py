@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.integrate import odeint
 
 from emir_analysis.bench.timing import Contender, Figure, durations, rates
-from emir_plant import core, lanes
+from emir_plant import core, integration, lanes
 from emir_plant.core import LOGIC, MODES, P_H, P_S, SPOOL, Truth
 from emir_plant.jit import compiled
 from emir_plant.plant import REST_PRESSURE, Plant
@@ -94,7 +94,7 @@ class Task:
         return self._ours(step)[:, COLUMNS]
 
     def _ours(self, step: float) -> Array:
-        return core.simulate(self.start, self.commands, SAMPLE, 1, self.plant.record, step)
+        return integration.simulate(self.start, self.commands, SAMPLE, 1, self.plant.record, step)
 
     def lsoda(self, tolerance: float) -> Array:
         """Return what scipy's LSODA gives on the same right-hand side, (k + 1, 5)."""
@@ -180,7 +180,7 @@ def joint_figures(seconds: float) -> Iterator[tuple[str, list[Figure]]]:
         state = task.start
         title = "One step() of 1 ms from Python, outputs included"
         yield title, durations("step", lambda: task.plant.step(state, 0.5, 1e-3), seconds)
-        title = f"Joints or runs at a time, steps of {core.STEP * 1e3:g} ms"
+        title = f"Joints or runs at a time, steps of {integration.STEP * 1e3:g} ms"
         yield title, _growth(task, c, seconds)
 
 
@@ -230,7 +230,7 @@ def _growth(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
     if c is not None:
 
         def by_c() -> Array:
-            return c.simulate(task.small_start, task.commands, core.STEP)
+            return c.simulate(task.small_start, task.commands, integration.STEP)
 
         contenders.append(Contender("plain C without effects", by_c, task.duration))
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]

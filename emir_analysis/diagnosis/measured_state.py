@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_analysis.signals import Array
-from emir_plant import core
+from emir_plant import core, integration
 from emir_plant.effects import (
     command_delay,
     linkage_error,
@@ -63,14 +63,14 @@ def _step(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle them
     """Advance x by dt, s, with RK4. measured: (3, 5) at start, middle and end of the step."""
     k1, k2, k3, k4, between = work[0], work[1], work[2], work[3], work[4]
     _write_rates(x, command, measured[0], p, k1)
-    core.write_sum(x, 0.5 * dt, k1, p, between)
+    integration.write_sum(x, 0.5 * dt, k1, p, between)
     _write_rates(between, command, measured[1], p, k2)
-    core.write_sum(x, 0.5 * dt, k2, p, between)
+    integration.write_sum(x, 0.5 * dt, k2, p, between)
     _write_rates(between, command, measured[1], p, k3)
-    core.write_sum(x, dt, k3, p, between)
+    integration.write_sum(x, dt, k3, p, between)
     _write_rates(between, command, measured[2], p, k4)
-    core.advance_by(x, dt, work, p)
-    core.remember(x, p)
+    integration.advance_by(x, dt, work, p)
+    integration.remember(x, p)
 
 
 @compiled_in_place

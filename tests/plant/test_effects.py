@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, quantities
-from emir_plant import core, linkage
+from emir_plant import core, integration, linkage
 from emir_plant.core import Truth
 from emir_plant.effects import (
     REGISTRY,
@@ -621,12 +621,12 @@ def test_hysteresis_is_a_play_behind_an_overshooting_spool() -> None:
     state = plant.initial(FORTY_FIVE, 20e5)
     found = []
     for command in commands:
-        state, _ = plant.step(state, command, core.STEP)
+        state, _ = plant.step(state, command, integration.STEP)
         found.append(valve_hysteresis.edges(state[core.SPOOL], state[core.EDGES], plant.record[0]))
 
     w = plant.record["natural_frequency"][0]
     given = np.repeat(commands, fine)
-    time = np.arange(given.size + 1) * core.STEP / fine
+    time = np.arange(given.size + 1) * integration.STEP / fine
     spool = signal.TransferFunction([w**2], [1.0, 2.0 * damping * w, w**2])
     _, swung, _ = signal.lsim(spool, np.append(given, 0.0), time, interp=False)
     edges, exact = 0.0, []
@@ -635,7 +635,7 @@ def test_hysteresis_is_a_play_behind_an_overshooting_spool() -> None:
         exact.append(edges)
     error = np.abs(np.array(found) - exact[fine - 1 :: fine])
     overshoot = 0.7 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
-    assert error.max() < overshoot * (w * core.STEP) ** 2 / 8.0  # turned back within a step
+    assert error.max() < overshoot * (w * integration.STEP) ** 2 / 8.0  # turned back within a step
     assert abs(found[-1]) > 10.0 * error[-1]  # where the last command was 0
 
 
@@ -668,8 +668,8 @@ def test_hysteresis_of_the_magnet_is_a_play_of_the_command() -> None:
     for command in commands:
         memory = min(max(memory, command - 0.5 * width), command + 0.5 * width)
         played.append(memory)
-    expected = PLAIN.simulate(start, np.array(played), core.STEP)
-    assert np.array_equal(plant.simulate(start, commands, core.STEP), expected)
+    expected = PLAIN.simulate(start, np.array(played), integration.STEP)
+    assert np.array_equal(plant.simulate(start, commands, integration.STEP), expected)
 
 
 @pytest.mark.parametrize("delay", [0.0004, 0.02, 0.0313, 0.15])
@@ -685,7 +685,7 @@ def test_delay_shifts_the_whole_answer(delay: float) -> None:
     error = np.abs(found - expected)[:, T["spool"]]
     # a switch inside an integration step acts as its mean: the spool is off by w^2 jump h^2/8
     jump, p = np.abs(np.diff(commands)).max(), PLAIN.record[0]
-    assert error.max() < 1.01 * p["natural_frequency"] ** 2 * jump * core.STEP**2 / 8.0
+    assert error.max() < 1.01 * p["natural_frequency"] ** 2 * jump * integration.STEP**2 / 8.0
     assert plant.simulate(start, commands, fine, 10) == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 

@@ -2,7 +2,7 @@
 
 import math
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -121,6 +121,7 @@ class Rosbag2Writer:
 
     compression: of the chunks in the files, a key of COMPRESSIONS. max_size (bytes) and
     max_duration (s, of log time): a new file is begun where the present one reaches them.
+    failure: what is raised where a method says WriteError, made of that one's line.
     The folder has to be new or empty: a recording is never written over. Raises ParameterError
     where it is not, or cannot be written to.
     """
@@ -129,6 +130,7 @@ class Rosbag2Writer:
     compression: str = "none"
     max_size: float = math.inf
     max_duration: float = math.inf
+    failure: Callable[[str], Exception] = WriteError
     _topics: dict[str, Topic] = field(default_factory=dict, init=False)
     _metadata: dict[str, dict[str, str]] = field(default_factory=dict, init=False)
     _attachments: list[Attachment] = field(default_factory=list, init=False)
@@ -165,6 +167,11 @@ class Rosbag2Writer:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    @property
+    def closed(self) -> bool:
+        """Return whether nothing more can be written."""
+        return self._closed
 
     @property
     def topics(self) -> set[str]:
@@ -246,12 +253,12 @@ class Rosbag2Writer:
         except OSError as error:
             raise self._given_up(error) from None
 
-    def _given_up(self, error: OSError) -> WriteError:
+    def _given_up(self, error: OSError) -> Exception:
         """Write no more; the file keeps what is in it. Returns what to raise."""
         self._closed = True
         with suppress(OSError):  # it tries once more to write what it still holds
             self._file.stream.close()
-        return WriteError(
+        return self.failure(
             f"{self._file.path}: {error.strerror}: recording ended;"
             " what came before it is kept (emir bag recover)"
         )

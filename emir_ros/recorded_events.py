@@ -5,7 +5,7 @@ the run later, in the order of stamps and names: recordings of the same run are 
 """
 
 import json
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,19 +25,12 @@ TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 class RecordedEvents:
     """Two topics of a recording.
 
-    nodes: full names of those whose status is recorded; none: everybody's. write(topic, data, log
-    time, publish time), times in ns. Subscribed to before the signals are, so that what a node
-    said first is not discovered after what it said later.
+    nodes: full names of those whose status is recorded; none: everybody's. Subscribed to before
+    the signals are, so that what a node said first is not discovered after what it said later.
     """
 
-    def __init__(
-        self,
-        node: Shell,
-        writer: Rosbag2Writer,
-        nodes: Collection[str],
-        write: Callable[[str, bytes, int, int], None],
-    ) -> None:
-        self._node, self._writer, self._nodes, self._write = node, writer, nodes, write
+    def __init__(self, node: Shell, writer: Rosbag2Writer, nodes: Collection[str]) -> None:
+        self._node, self._writer, self._nodes = node, writer, nodes
         self._waiting: list[tuple[int, bytes]] = []  # lock step: stamp, status
         self._orders = node.resolve_topic_name(ORDERS)
         self._begin = node.now_ns()  # what was ordered before is told once more
@@ -81,7 +74,7 @@ class RecordedEvents:
             profile = qos.offered(lockstep=self._node.lockstep)
             about = channel_metadata([qos.as_rosbag2(profile)], type_hash(TYPE))
             self._writer.add_topic(topic, schema(TYPE), about | {"fields": json.dumps({})})
-        self._write(topic, data, log_time, publish_time)
+        self._writer.write(topic, data, log_time, publish_time)
 
 
 def _plain(message: Any) -> Any:

@@ -10,8 +10,7 @@ clock otherwise), so a recorder that is killed outright loses no more than that.
 import json
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from emir_analysis.machine_record import PLANT, machine_record
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
-    WriteError,
     channel_metadata,
 )
 from emir_common.quantity import ParameterError
@@ -94,15 +92,12 @@ class RecorderNode(Shell):
         self._full_names = {name: self.resolve_topic_name(name) for name in names}
         with naming(self):
             self._writer = writer()
-        self._failed = False
-        with self._watched():
-            self._writer.add_metadata("emir", metadata)
+        self._writer.add_metadata("emir", metadata)
         ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._acknowledge = sender(ack)
         self.changes = 0  # of parameters, recorded
         self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
-        with self._watched():
-            self._events = RecordedEvents(self, self._writer, self._nodes, self._write)
+        self._events = RecordedEvents(self, self._writer, self._nodes)
         self._pending: defaultdict[int, dict[str, bytes]] = defaultdict(dict)  # by stamp, full name
         self._next = 0
         for topic in self._topics:
@@ -115,7 +110,7 @@ class RecorderNode(Shell):
         self.create_subscription(String, DESCRIPTION, self._on_urdf, qos.latched())
         self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
         if not self.lockstep:
-            self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._flush)
+            self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._writer.flush)
 
     def _make_writer(self, folder: str) -> Callable[[], Rosbag2Writer]:
         """Declare what the file shall be like."""
@@ -133,6 +128,7 @@ class RecorderNode(Shell):
             compression,
             max_size=size * MEGABYTE or math.inf,
             max_duration=duration or math.inf,
+            failure=lambda said: NodeError(f"recorder_node: {said}"),
         )
 
     @property
@@ -142,7 +138,7 @@ class RecorderNode(Shell):
 
     def close(self) -> None:
         """Write what is left and finish the file."""
-        if self._failed:
+        if self._writer.closed:
             return
         if not self.heard and not self.lockstep:  # `emir run` says itself why
             first, *others = self._full_names.values()
@@ -151,38 +147,14 @@ class RecorderNode(Shell):
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
         self._events.write_all()
-        with self._watched():
-            self._writer.close()
-
-    @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """Take a recording that cannot go on as the end of this node."""
-        try:
-            yield
-        except WriteError as error:
-            raise self._given_up(error) from None
-
-    def _given_up(self, error: WriteError) -> NodeError:
-        self._failed = True
-        return NodeError(f"recorder_node: {error}")
-
-    def _write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
-        try:
-            self._writer.write(topic, data, log_time, publish_time)
-        except WriteError as error:
-            raise self._given_up(error) from None
-
-    def _flush(self) -> None:
-        with self._watched():
-            self._writer.flush()
+        self._writer.close()
 
     def _record(self, topic: Topic) -> None:
         full_name = self._full_names[topic.name]
         profile = qos.offered(lockstep=self.lockstep)
         about = channel_metadata([qos.as_rosbag2(profile)], type_hash(topic.type))
         about |= {"publisher": topic.publisher, "fields": json.dumps(field_table(topic))}
-        with self._watched():
-            self._writer.add_topic(full_name, schema(topic.type), about)
+        self._writer.add_topic(full_name, schema(topic.type), about)
 
         def receive_by_stamp(data: bytes) -> None:
             stamp = stamp_ns(data)
@@ -193,7 +165,7 @@ class RecorderNode(Shell):
 
         def receive_by_clock(data: bytes) -> None:
             self.heard += 1
-            self._write(full_name, data, self.now_ns(), stamp_ns(data))
+            self._writer.write(full_name, data, self.now_ns(), stamp_ns(data))
 
         profile.depth = QUEUE
         self.hear(topic, receive_by_stamp if self.lockstep else receive_by_clock, profile)
@@ -205,7 +177,7 @@ class RecorderNode(Shell):
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
             self._write_stamp(self._next)
             if whole_second:
-                self._flush()
+                self._writer.flush()
             if self._next % CONTROL_PERIOD_NS == 0:
                 self._acknowledge(header_message(self._next))
             self._next += PLANT_PERIOD_NS
@@ -216,10 +188,9 @@ class RecorderNode(Shell):
 
     def _write_stamp(self, stamp: int) -> None:
         messages = self._pending.pop(stamp)
-        with self._watched():
-            for name in self._full_names.values():
-                if name in messages:
-                    self._writer.write(name, messages[name], stamp, stamp)
+        for name in self._full_names.values():
+            if name in messages:
+                self._writer.write(name, messages[name], stamp, stamp)
 
     def _on_answers(self, answers: dict[str, dict[str, Any]]) -> None:
         self._answers = answers
@@ -239,13 +210,12 @@ class RecorderNode(Shell):
         """
         if not self._answers or self._urdf is None:
             return
-        with self._watched():
-            self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
-            machine = machine_record(self._answers.get(PLANT, {}))
-            if machine:
-                self._writer.add_metadata(MACHINE, machine)
-            for name, values in self._answers.items():
-                self._attach_files(name, values)
+        self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
+        machine = machine_record(self._answers.get(PLANT, {}))
+        if machine:
+            self._writer.add_metadata(MACHINE, machine)
+        for name, values in self._answers.items():
+            self._attach_files(name, values)
         if self._urdf:
             self._attach_urdf()
         self._described = True
@@ -260,8 +230,7 @@ class RecorderNode(Shell):
 
     def _attach_urdf(self) -> None:
         data = (self._urdf or "").encode()
-        with self._watched():
-            self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
+        self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
 
     def _on_change(self, event: ParameterEvent) -> None:
         """Store what was set at a node while it runs, with the recording's own time."""
@@ -271,8 +240,7 @@ class RecorderNode(Shell):
         for parameter in event.changed_parameters:
             value = parameter_value_to_python(parameter.value)
             change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
-            with self._watched():
-                self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
+            self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
             self.changes += 1
 
 

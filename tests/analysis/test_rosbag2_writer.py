@@ -1,6 +1,7 @@
 """Split, compressed and flushed recordings, read by `rosbags` and by mcap's own reader."""
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 from mcap.reader import make_reader
-from mcap.records import Schema
+from mcap.records import Attachment, Schema
 from rosbags.highlevel import AnyReader
 
 from emir_analysis import bags
@@ -109,6 +110,27 @@ def test_an_empty_folder_is_taken_and_a_filled_one_is_not_written_over(tmp_path:
     with pytest.raises(ParameterError, match="exists already, and is not overwritten"):
         Rosbag2Writer(before[0])  # a file of that name
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("what", ["attachment", "topic", "message"])
+def test_a_full_disk_is_told_as_the_caller_wants_it(what: str, tmp_path: Path) -> None:
+    """A limit on the file's size stands for the end of the disk; the system says the same."""
+    writer = Rosbag2Writer(tmp_path / "bag", failure=lambda said: RuntimeError(f"rig: {said}"))
+    _write(writer, 1)
+    large = bytes(4 * CHUNK)
+    fill = {
+        "attachment": lambda: writer.add_attachment(Attachment(0, 0, "a", "b", large)),
+        "topic": lambda: writer.add_topic("/b", Schema(0, large, "ros2msg", "x/msg/B"), {}),
+        "message": lambda: writer.write("/a", large, SECOND, SECOND),
+    }
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (CHUNK, limits[1]))
+    try:
+        with pytest.raises(RuntimeError, match=r"rig: .*bag_0\.mcap: File too large: recording"):
+            fill[what]()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert writer.closed
 
 
 def test_what_was_flushed_outlives_the_process(tmp_path: Path) -> None:

@@ -12,17 +12,10 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-from mcap.records import Attachment
-from rcl_interfaces.msg import ParameterEvent
-from rclpy.parameter import parameter_value_to_python
 from rclpy.validate_node_name import validate_node_name
-from std_msgs.msg import Header, String
+from std_msgs.msg import Header
 
-from emir_analysis import parameter_files
-from emir_analysis.info import CHANGE, MACHINE, PARAMETERS, Change
-from emir_analysis.machine_record import PLANT, machine_record
 from emir_analysis.rosbag2_writer import (
     COMPRESSIONS,
     Rosbag2Writer,
@@ -42,17 +35,14 @@ from emir_msgs_py.topics import (
     by_name,
 )
 from emir_ros import qos
-from emir_ros.diagnostics import Level
 from emir_ros.main import run
 from emir_ros.message_definitions import schema, type_hash
 from emir_ros.node_parameters import declare, naming, reject_unknown
-from emir_ros.parameter_record import ParameterRecord, as_metadata
-from emir_ros.picture import DESCRIPTION
 from emir_ros.recorded_events import RecordedEvents
+from emir_ros.recorded_setup import RecordedSetup
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import header_message, sender, stamp_ns
 
-EVENTS = 1000  # depth, as ROS has it for parameter events
 QUEUE = 10_000  # messages of a topic that may wait here while the file system keeps us waiting
 FLUSH_PERIOD_NS = conversions.NANOSECONDS
 MEGABYTE = 1_000_000
@@ -81,10 +71,9 @@ class RecorderNode(Shell):
         folder: str = declare(self, "bag", "", "folder of the recording, must not exist")
         names: list[str] = declare(self, "topics", everything, "topics to record")
         about: str = declare(self, "description", "{}", "JSON: texts by key, kept in the file")
-        nodes: list[str] = declare(self, "nodes", [""], "nodes whose parameters are recorded")
+        given: list[str] = declare(self, "nodes", [""], "nodes whose parameters are recorded")
         metadata = _description(about)
-        for node in filter(None, nodes):
-            validate_node_name(node)
+        nodes = {name: self._full_name(name) for name in given if name}
         writer = self._make_writer(folder)
         reject_unknown(self)
         self._topics = [_known(name, self._table) for name in names]
@@ -95,22 +84,20 @@ class RecorderNode(Shell):
         self._writer.add_metadata("emir", metadata)
         ack = self.create_publisher(Header, RECORDED, qos.offered(lockstep=self.lockstep))
         self._acknowledge = sender(ack)
-        self.changes = 0  # of parameters, recorded
-        self._nodes = [f"{self.get_namespace().rstrip('/')}/{name}" for name in nodes if name]
-        self._events = RecordedEvents(self, self._writer, self._nodes)
+        self._events = RecordedEvents(self, self._writer, nodes.values())
         self._pending: defaultdict[int, dict[str, bytes]] = defaultdict(dict)  # by stamp, full name
         self._next = 0
         for topic in self._topics:
             self._record(topic)
-        self._described = not any(nodes)
-        self._answers: dict[str, dict[str, Any]] = {}
-        self._urdf: str | None = None if PLANT in nodes else ""  # None: still to come
-        if not self._described:
-            ParameterRecord(self, nodes, self._on_answers)
-        self.create_subscription(String, DESCRIPTION, self._on_urdf, qos.latched())
-        self.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
+        self._setup = RecordedSetup(
+            self, self._writer, nodes, self._time, self._write_complete_stamps
+        )
         if not self.lockstep:
             self.create_timer(FLUSH_PERIOD_NS * 1e-9, self._writer.flush)
+
+    def _full_name(self, node: str) -> str:
+        validate_node_name(node)
+        return f"{self.get_namespace().rstrip('/')}/{node}"
 
     def _make_writer(self, folder: str) -> Callable[[], Rosbag2Writer]:
         """Declare what the file shall be like."""
@@ -135,6 +122,11 @@ class RecorderNode(Shell):
     def writer(self) -> Rosbag2Writer:
         """Return the recording so far."""
         return self._writer
+
+    @property
+    def changes(self) -> int:
+        """Return how many settings of parameters were recorded."""
+        return self._setup.changes
 
     def close(self) -> None:
         """Write what is left and finish the file."""
@@ -170,8 +162,13 @@ class RecorderNode(Shell):
         profile.depth = QUEUE
         self.hear(topic, receive_by_stamp if self.lockstep else receive_by_clock, profile)
 
+    def _time(self) -> int:
+        """Return the recording's own time, ns."""
+        return self._next if self.lockstep else self.now_ns()
+
     def _write_complete_stamps(self) -> None:
-        while self._described and len(self._pending[self._next]) == self._expected(self._next):
+        """Write the stamps that are whole; none before the setup: all recordings are the same."""
+        while self._setup.complete and len(self._pending[self._next]) == self._expected(self._next):
             whole_second = self._next % FLUSH_PERIOD_NS == 0
             if whole_second:  # before what may begin a new file
                 self._events.write_until(self._next - FLUSH_PERIOD_NS)
@@ -191,57 +188,6 @@ class RecorderNode(Shell):
         for name in self._full_names.values():
             if name in messages:
                 self._writer.write(name, messages[name], stamp, stamp)
-
-    def _on_answers(self, answers: dict[str, dict[str, Any]]) -> None:
-        self._answers = answers
-        self._describe()
-
-    def _on_urdf(self, message: String) -> None:
-        first, self._urdf = not self._urdf, message.data
-        if first and self._described:
-            self._attach_urdf()
-        elif first:
-            self._describe()
-
-    def _describe(self) -> None:
-        """Store parameters and robot description once both have come.
-
-        In lock step nothing is written before, so that every recording is the same.
-        """
-        if not self._answers or self._urdf is None:
-            return
-        self._writer.add_metadata(PARAMETERS, as_metadata(self._answers))
-        machine = machine_record(self._answers.get(PLANT, {}))
-        if machine:
-            self._writer.add_metadata(MACHINE, machine)
-        for name, values in self._answers.items():
-            self._attach_files(name, values)
-        if self._urdf:
-            self._attach_urdf()
-        self._described = True
-        self._write_complete_stamps()
-
-    def _attach_files(self, node: str, values: dict[str, Any]) -> None:
-        try:
-            for attachment in parameter_files.attachments(node, values):
-                self._writer.add_attachment(attachment)
-        except ParameterError as error:
-            self.diagnostics.say(Level.WARN, f"not in the recording: {error}")
-
-    def _attach_urdf(self) -> None:
-        data = (self._urdf or "").encode()
-        self._writer.add_attachment(Attachment(0, 0, f"{DESCRIPTION}.urdf", "text/xml", data))
-
-    def _on_change(self, event: ParameterEvent) -> None:
-        """Store what was set at a node while it runs, with the recording's own time."""
-        if self._nodes and event.node not in self._nodes:
-            return
-        time = self._next if self.lockstep else self.now_ns()
-        for parameter in event.changed_parameters:
-            value = parameter_value_to_python(parameter.value)
-            change = Change(time, event.node, parameter.name, json.dumps(value, default=list))
-            self._writer.add_metadata(f"{CHANGE}.{self.changes}", change.as_metadata())
-            self.changes += 1
 
 
 def _known(name: str, table: tuple[Topic, ...]) -> Topic:

@@ -5,7 +5,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -137,7 +137,7 @@ def _run(node_class: Callable[[], Shell]) -> int:
             stop = start_ros()
             _check_words(remove_ros_args(sys.argv)[1:])
             node = node_class()
-        with make_executor() as executor:
+        with closing(node), make_executor() as executor:
             executor.add_node(node)
             keep_out_of_garbage_collection()
             with suppress(KeyboardInterrupt):
@@ -151,7 +151,6 @@ def _run(node_class: Callable[[], Shell]) -> int:
         return 1
     finally:
         if node is not None:
-            node.close()
             # Where many nodes end at once, Fast DDS may wait for its own thread, and never get it.
             signal.alarm(LONGEST_END)
             node.destroy_node()

@@ -249,6 +249,25 @@ emir_ros.main.run(Stuck)
 """
 
 
+def test_what_goes_wrong_at_the_very_end_is_one_line() -> None:
+    """Such as a disk that is full just when the recording is finished."""
+    script = (
+        "from emir_ros.main import run; from emir_ros.shell import NodeError, Shell\n"
+        "class Node(Shell):\n"
+        "    def __init__(self): super().__init__('rig', []); self.ended.set_result(None)\n"
+        "    def close(self): raise NodeError('rig: disk full')\n"
+        "run(Node)"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE,
+        check=False,
+    )
+    assert (finished.returncode, finished.stderr) == (1, "rig: disk full\n")
+
+
 def test_a_node_that_cannot_end_is_ended() -> None:
     command = [sys.executable, "-c", STUCK]
     finished = subprocess.run(

@@ -5,12 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from emir_analysis import compare_grid, damping, trade_off, yardstick
+from emir_analysis import compare_grid, compare_results, damping, trade_off, yardstick
 from emir_analysis.compare import Run, as_text, controllers, picture, repeated, select
 from emir_analysis.compare_grid import NOMINAL, WHOLE, Case, grid
 from emir_analysis.control_protocols import Stepping
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.outputs import check_outputs, check_picture, write_picture
+from emir_analysis.paper_claims import order_of_merit
 from emir_analysis.unused_options import check_unused
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
@@ -156,11 +157,11 @@ def _grid(
         raise InputError("--repeat is for one case: a grid varies enough")
     found, left_out = compare_grid.results(joint1(), chosen, cases, progress, options.trajectory)
     if options.picture:
-        write_picture(options.picture, compare_grid.picture(found))
+        write_picture(options.picture, compare_results.picture(found))
     if options.csv:
-        compare_grid.write_csv(found, options.csv)
+        compare_results.write_csv(found, options.csv)
     count = len({result.case for result in found})
-    table, claims = compare_grid.as_text(found), compare_grid.order_of_merit(found)
+    table, claims = compare_results.as_text(found), order_of_merit(found)
     text = f"{count} cases; median / worst\n\n{table}\n\n{claims}".rstrip()
     if left_out:
         told = f"{len(left_out)} of {len(cases)} cases left out; the first: {left_out[0]}"

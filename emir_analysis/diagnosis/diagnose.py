@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.misstated import misstated
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import at_noise, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
@@ -37,7 +38,9 @@ class Findings:
     as stated (`before`), `refitted` and `after`; floor: (5,) the sensors' share, limit: (5,) from
     which on a balance speaks. speaking: the balance that no effect takes down to the noise, the
     loudest or that which swings with time, shape: of its residual, swing: how that swings, where:
-    most of it lies. curve: what has no name, with which `chosen` and `after` then are.
+    most of it lies. misstated: parameters with one value of the sheet replaced, their last unknown,
+    where that explains what no effect does, the best first; curve: what has no name. With either
+    `chosen` and `after` then are.
     """
 
     evidence: Evidence
@@ -57,6 +60,7 @@ class Findings:
     shape: Shape | None
     swing: Swing | None
     where: Where | None
+    misstated: tuple[Trial, ...]
     curve: Curve | None
 
 
@@ -89,10 +93,15 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     lies = None if speaking is None else _where(evidence, after, floor, speaking)
-    if verdict == "unexplained" and speaking is not None and with_curve is None:
-        with_curve = _measured(curves, chosen, search, evidence, progress)
-    if with_curve is not None:
-        final, after = with_curve, evidence.residuals([with_curve.machine])[0]
+    replaced: list[Trial] = []
+    if verdict == "unexplained" and with_curve is None:
+        progress("asking whether one value of the data sheet is another")
+        replaced = misstated(search.balanced, evidence, search.floor)
+        if speaking is not None and not replaced:
+            with_curve = _measured(curves, chosen, search, evidence, progress)
+    added = next(iter(replaced), with_curve)
+    if added is not None:
+        final, after = added, evidence.residuals([added.machine])[0]
     return Findings(
         evidence=evidence,
         sheet=sheet,
@@ -111,6 +120,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         shape=shape,
         swing=swings,
         where=lies,
+        misstated=tuple(replaced),
         curve=None if with_curve is None else curve(final.machine),
     )
 

@@ -45,6 +45,7 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
         Text(in_short(result)),
         *[Text(line) for line in cautions(result)],
         *_effects(result.effects),
+        *_misstated(result),
         *_free_runs(findings, result, judged),
         *_balances(findings, result),
         *_candidates(result),
@@ -68,6 +69,16 @@ def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
     ]
     columns = ("effect", "balance", "parameter", "value", "interval", "unit", "meaning")
     caption = "interval: two standard deviations either way from the curvature of the fit"
+    return [Table(columns, rows, caption)] if rows else []
+
+
+def _misstated(result: Diagnosis) -> list[Block]:
+    rows = [
+        (m.name, m.stated, m.wanted.told[0], m.wanted.interval, m.wanted.unit)
+        for m in result.misstated
+    ]
+    columns = ("value in the data sheet", "stated", "wanted", "interval", "unit")
+    caption = "Each alone explains the recordings with the others as stated, within tolerances."
     return [Table(columns, rows, caption)] if rows else []
 
 
@@ -110,7 +121,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
 
 
 def _nothing_added(result: Diagnosis) -> str:
-    if result.effects or result.curve is not None:
+    if result.effects or result.misstated or result.curve is not None:
         return ""
     return " Nothing was added: the machine with effect is the re-fitted one."
 

@@ -167,6 +167,8 @@ def curve_picture(curve: Curve) -> Figure:
 
 def _added(findings: Findings) -> str:
     """Return what the final machine has more than the re-fitted one."""
+    if findings.misstated:
+        return f"with another {findings.misstated[0].unknowns.members[-1].path}"
     return findings.chosen.name if findings.curve is None else "with the curve"
 
 

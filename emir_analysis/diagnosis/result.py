@@ -28,6 +28,7 @@ from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
 from emir_common.quantity import quantities
 from emir_plant.effects import REGISTRY, Effects
 from emir_plant.linearize import linearize
@@ -89,6 +90,15 @@ class EffectResult:
     name: str
     balance: str
     parameters: dict[str, ParameterResult]
+
+
+@dataclass(frozen=True)
+class MisstatedResult:
+    """A value of the data sheet, by dotted path, as it is stated and as the recordings want it."""
+
+    name: str
+    stated: float
+    wanted: ParameterResult
 
 
 @dataclass(frozen=True)
@@ -158,6 +168,7 @@ class Diagnosis:
     shape: Shape | None
     swing: Swing | None
     where: Where | None
+    misstated: tuple[MisstatedResult, ...]
     curve: Curve | None
     at_end: tuple[str, ...]
     untold: dict[str, str]
@@ -194,6 +205,7 @@ def diagnosis(
         shape=findings.shape,
         swing=findings.swing,
         where=findings.where,
+        misstated=tuple(_misstated(trial, findings.evidence) for trial in findings.misstated),
         curve=findings.curve,
         at_end=at_end(findings),
         untold=untold(findings.evidence),
@@ -231,6 +243,13 @@ def _parameters(trial: Trial, evidence: Evidence) -> dict[str, ParameterResult]:
         note = OPEN if anything and not unknown.toleranced else ""
         result[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it, "", note)
     return result
+
+
+def _misstated(trial: Trial, evidence: Evidence) -> MisstatedResult:
+    value = trial.unknowns.members[-1]
+    wanted = _parameters(trial, evidence)[value.path]
+    meaning = declared(trial.machine)[value.path][0].meaning
+    return MisstatedResult(value.path, value.origin, replace(wanted, meaning=meaning))
 
 
 def _without_points(paths: Sequence[str]) -> tuple[str, ...]:

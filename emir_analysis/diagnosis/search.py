@@ -27,6 +27,7 @@ from emir_analysis.diagnosis.select import (
     LEFT,
     SEEN,
     STRONG,
+    astray,
     at_noise,
     balance_score,
     beyond,
@@ -317,7 +318,7 @@ class Search:
         unexplained = beyond(EXPLAINED)
         if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
             return []
-        near = self._evidence.until(_astray(best.trial, self._evidence) + SHORTEST)
+        near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
         limit = (1.0 - PROMISING) * excess(best.trial, near)
         found = []
         for screened in screen_free_run(best.trial, self._sheet, near)[:MOST_SIMULATED]:
@@ -349,7 +350,7 @@ class Search:
 
         Where it has long gone astray no first-order step says anything.
         """
-        near = self._head.until(_astray(best.trial, self._head) + SHORTEST)
+        near = self._head.until(astray(best.trial, self._head) + SHORTEST)
         found = screen_free_run(best.trial, self._sheet, near)
         return [self._scored(self._led(s.trial, best)) for s in found[:MOST_SIMULATED]]
 
@@ -473,17 +474,6 @@ class Search:
 
     def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
-
-
-def _astray(tried: Trial, evidence: Evidence) -> float:
-    """Return until when, s, the free run of any recording stays near the machine."""
-    near = []
-    for experiment, errors in zip(
-        evidence.experiments, free_run_errors(tried.machine, evidence), strict=True
-    ):
-        so_far = np.cumsum(np.mean(errors**2, axis=1)) / np.arange(1, len(errors) + 1)
-        near.append(experiment.period * np.count_nonzero(so_far <= HOPELESS**2))
-    return float(max(near))
 
 
 def _as_good(better: list[Tried]) -> list[Trial]:

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from emir_analysis.diagnosis.balances import FORCE_WINDOW, level
-from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
+from emir_analysis.diagnosis.candidates import HOPELESS, Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -129,3 +129,14 @@ def beyond(times: float) -> float:
 def at_noise(tried: Trial, evidence: Evidence) -> bool:
     """Tell whether all signals together are down to the noise."""
     return excess(tried, evidence) <= beyond(AT_NOISE)
+
+
+def astray(tried: Trial, evidence: Evidence) -> float:
+    """Return until when, s, the free run of any recording stays near the machine."""
+    near = []
+    for experiment, errors in zip(
+        evidence.experiments, free_run_errors(tried.machine, evidence), strict=True
+    ):
+        so_far = np.cumsum(np.mean(errors**2, axis=1)) / np.arange(1, len(errors) + 1)
+        near.append(experiment.period * np.count_nonzero(so_far <= HOPELESS**2))
+    return float(max(near))

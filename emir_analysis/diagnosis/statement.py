@@ -60,37 +60,45 @@ def statement(findings: Findings, judged: Judged) -> str:
 
 
 def _of_findings(findings: Findings) -> str:
-    names = " and ".join(findings.chosen.effects)
-    speaking, shape, lies = findings.speaking, findings.shape, findings.where
     if findings.verdict == "nothing_missing":
         return "parameters inside the tolerances bring every balance and the free run to the noise"
-    remainder = ""
-    if speaking is not None and shape is not None and lies is not None:
-        column = list(BALANCES).index(speaking)
-        stage = "refitted" if findings.verdict == "unexplained" else "after"
-        size = level(findings.residuals[stage])[column]
-        noise_share = size / findings.floor[column]
-        remainder = (
-            f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
-            f" ({noise_share:.1f} times its noise)"
-        )
-        if findings.curve is None:
-            remainder += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
-            if speaking == "force" and _is_untold(shape, findings.swing, lies):
-                remainder += (
-                    "; it may be a load from outside (wind, a push, a load that swings) of another"
-                    " course over time than those looked for"
-                )
+    remainder = _remainder(findings)
     if findings.verdict == "unexplained":
-        known = "" if findings.rejected is None else _rejected(findings.rejected, findings)
         left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
+        if findings.misstated:
+            return f"{left}; {_misstated(findings)}"
+        known = "" if findings.rejected is None else _rejected(findings.rejected, findings)
         return known + left + of_stamps(findings.evidence.experiments)
+    names = " and ".join(findings.chosen.effects)
     if findings.verdict == "ambiguous":
         names += " or " + " or ".join(rival.name for rival in findings.rivals)
         names += ", which this recording cannot tell apart"
     left = f"; {remainder}" if remainder else ""
     more = other_reasons(findings.chosen) + _undecided(findings) + _unforeseeable(findings)
     return names + left + more
+
+
+def _remainder(findings: Findings) -> str:
+    """Return which balance keeps how much, and of what that is a function; empty if none does."""
+    speaking, shape, lies = findings.speaking, findings.shape, findings.where
+    if speaking is None or shape is None or lies is None:
+        return ""
+    stage = "refitted" if findings.verdict == "unexplained" else "after"
+    size = level(findings.residuals[stage])[list(BALANCES).index(speaking)]
+    noise_share = size / findings.floor[list(BALANCES).index(speaking)]
+    keeps = (
+        f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
+        f" ({noise_share:.1f} times its noise)"
+    )
+    if findings.curve is not None or findings.misstated:
+        return keeps
+    keeps += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
+    if speaking == "force" and _is_untold(shape, findings.swing, lies):
+        keeps += (
+            "; it may be a load from outside (wind, a push, a load that swings) of another"
+            " course over time than those looked for"
+        )
+    return keeps
 
 
 def other_reasons(chosen: Trial) -> str:
@@ -124,6 +132,20 @@ def _undecided(findings: Findings) -> str:
                 f" {value:.0f} is taken: in {best} they differ by {apart:.0f} times the noise"
             )
     return words
+
+
+def _misstated(findings: Findings) -> str:
+    """Return which value of the data sheet explains all of it if it is another."""
+    said = []
+    for trial in findings.misstated:
+        about, value = trial.unknowns.members[-1], float(trial.x[-1])
+        unit = "" if about.unit == "1" else f" {about.unit}"
+        said.append(f"{about.path} = {about.value(value):.4g}{unit} for {about.origin:.4g}{unit}")
+    left = math.sqrt(mean_square(findings.misstated[0], findings.evidence))
+    return (
+        f"no effect explains it, but another value in the data sheet does: {' or '.join(said)},"
+        f" with which the free run of {findings.evidence.name} is {left:.2f} times the noise off"
+    )
 
 
 def _from(findings: Findings) -> str:
@@ -178,6 +200,8 @@ def _unforeseeable(findings: Findings) -> str:
 def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.curve is not None:
         return _measured(findings.curve, findings, judged)
+    if findings.misstated:
+        return f", that of {judged.evidence.name} {judged.off(STAGES[-1]):.2f}"
     if findings.verdict == "unexplained":
         elsewhere = _elsewhere(findings, judged)
         return f"; {judged.evidence.name} goes further{elsewhere}" if elsewhere else ""
@@ -285,8 +309,12 @@ def _rejected(rejected: Trial, findings: Findings) -> str:
     left, plain = (
         math.sqrt(mean_square(trial, findings.evidence)) for trial in (rejected, findings.refitted)
     )
-    off = f" ({left:.1f} times the noise in the free run, parameters alone {plain:.1f})"
-    off = off if math.isfinite(left + plain) else ""
+    off = f"{left:.1f} times the noise in the free run, parameters alone {plain:.1f}"
+    if left <= EXPLAINED:  # a balance speaks, then
+        loudness = level(findings.evidence.residuals([rejected.machine])[0]) / findings.floor
+        name = list(BALANCES)[int(np.nanargmax(loudness))]
+        off += f", but {np.nanmax(loudness):.1f} in the balance {name}"
+    off = f" ({off})" if math.isfinite(left + plain) else ""
     them = "them" if len(rejected.effects) > 1 else "it"
     return f"{closest(rejected)}{off}; without {them} "
 

@@ -199,22 +199,20 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     while time < end:
         holds = holds and fitted.misfit <= AT_NOISE
         growths = GROWTHS if holds else GROWTHS[:-1]
-        longer = _followed(known, evidence, fitted, time, end, growths)
-        if longer == time and smooth:
-            longer = _longer(GROWTH * time, end)
-        if longer > time:
-            part = evidence.until(longer)
+        longer, before = _followed(known, evidence, fitted, time, end, growths), fitted.misfit
+        followed = longer > time
+        if not followed:
+            longer = _longer((GROWTH if smooth else growths[-1]) * time, end)
+        part = evidence.until(longer)
+        if followed or smooth:
             accuracy = FREE_RUN_ACCURACY if longer == end else ROUGH_ACCURACY
             fitted = _fitted(known, part, fitted.x, accuracy, method, fitted.curvature)
         else:
-            longer = _longer(growths[-1] * time, end)
-            before = fitted.misfit
             draws = DRAWS_EARLY if longer <= EARLY else DRAWS
-            part = evidence.until(longer)
             fitted = _found_again(known, part, fitted, method, draws if holds else 1)
             holds = holds and fitted.misfit <= AS_BEFORE * before
-            if rival is not None and fitted.misfit > WORSE * _misfit(rival, part):
-                break
+        if not followed and rival is not None and fitted.misfit > WORSE * _misfit(rival, part):
+            break
         time = longer
     return fitted
 

@@ -28,6 +28,7 @@ def summary(result: Diagnosis) -> str:
     lines = [f"{result.verdict}: {result.statement}"]
     lines += cautions(result)
     lines += [line for effect in result.effects for line in _sizes(effect)]
+    lines += [parameter_line(m.name, m.wanted, m.wanted.unit) for m in result.misstated]
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in told_balances(result).items():
         figures = (b.noise, b.before, b.refitted, b.after)
@@ -90,6 +91,13 @@ def in_short(result: Diagnosis) -> str:
         return (
             f"{errors}: {came} by the data sheet, {after} with its parameters fitted. Take these,"
             " below, in place of the stated ones; --model-out writes them."
+        )
+    if result.misstated:
+        names = " or ".join(m.name for m in result.misstated)
+        return (
+            f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted, {after}"
+            f" with {result.misstated[0].name} as below. Check {names} on the machine, and mend the"
+            " data sheet; --model-out writes the machine with it."
         )
     return (
         f"{errors}: {came} by the data sheet, {refitted} with its parameters fitted"

@@ -216,6 +216,7 @@ class Whole:
         found = self._grown(law, fuller, rival)
         if AT_NOISE < found.left < HOPELESS and not is_along_the_way(law):
             ways = [along_the_way(each) for each in (law, *fuller)]
+            rival = min(found.trial, rival, key=self.score)
             found = min(found, self._grown(ways[0], ways[1:], rival), key=lambda f: f.left)
         return self._heard(found.trial)
 

@@ -1,0 +1,125 @@
+"""Values of the data sheet that are not the machine's: whether one alone explains recordings.
+
+No effect of the registry: an area, a length or a damping that the sheet states as exact, or one
+that is further off than its tolerance. Each is tried to first order, beside the parameters, on the
+balances and on the free run for as long as that stays near; what promises most is fitted.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from emir_analysis.diagnosis.candidates import (
+    FREE_RUN_STEP,
+    Trial,
+    coarse_errors,
+    fit_balances,
+    fit_free_run,
+    settled,
+    with_spread,
+)
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import SHORTEST
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, HELD, TOLERANCE_SPREAD, steps_inside
+from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_score, leaves_quiet
+from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown
+from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
+from emir_plant.parameters import Machine
+
+STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block")  # groups
+LARGEST = math.log(10.0)  # of a value over the stated one, either way
+MOST_FITTED = 2  # of those that promise most on the balances, and on the free run
+
+Missing = Callable[[Sequence[Machine]], Array]  # (m, n) in units of the noise
+
+
+def misstated(balanced: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
+    """Return parameters with one value of the sheet replaced, the last unknown, if that suffices.
+
+    The best first, and those that are as good. balanced: without effects, fitted to the balances.
+    floor: (5,) of the balances.
+    """
+    starts = [_replaced(balanced, unknown) for unknown in _values(balanced.unknowns.machine)]
+    near = evidence.until(astray(balanced, evidence) + SHORTEST)
+    rest = [settled(balanced.machine, e, near) for e in near.experiments]
+    found: dict[str, Trial] = {}
+    if np.any(evidence.fitted):
+
+        def in_balances(machines: Sequence[Machine]) -> Array:
+            return evidence.in_noise(evidence.residuals(machines), floor)
+
+        found |= _promising(balanced, starts, in_balances, DIFFERENCE_STEP)
+
+    def in_free_run(machines: Sequence[Machine]) -> Array:
+        return coarse_errors(machines, near, rest)
+
+    found |= _promising(balanced, starts, in_free_run, FREE_RUN_STEP)
+    fitted = [_fitted(start, evidence, floor) for start in found.values()]
+    enough = [each for each in fitted if each is not None]
+    scores = [free_run_score(each, evidence, seen=0.0) for each in enough]
+    order = np.argsort(scores)
+    return [enough[k] for k in order if scores[k] < scores[order[0]] + STRONG]
+
+
+def _values(machine: Machine) -> list[Unknown]:
+    """Return the sheet's values that are no whole numbers and not zero, as their logarithms."""
+    found = []
+    for path, (about, value) in declared(machine).items():
+        if path.partition(".")[0] in STATED and isinstance(value, float) and value > 0.0:
+            least = math.log(about.low / value) + ROUNDING if about.low > 0.0 else -LARGEST
+            low, high = max(least, -LARGEST), min(math.log(about.high / value), LARGEST) - ROUNDING
+            if low < 0.0 < high:
+                unknown = Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True)
+                found.append(unknown)
+    return found
+
+
+def _replaced(known: Trial, value: Unknown) -> Trial:
+    """Return a trial with a value to be fitted, freed of its tolerance if it has one."""
+    return known.fixed(value.path, value.origin).also(value)
+
+
+def _promising(
+    known: Trial, starts: Sequence[Trial], missing: Missing, step: float
+) -> dict[str, Trial]:
+    """Return those trials, by the value's path, that leave least to first order.
+
+    starts: with one unknown more than the known one or in place of one of its own.
+    """
+    members = known.unknowns.members
+    steps = steps_inside(known.x, step, known.unknowns.bounds[1])
+    moved = [known.unknowns.at(x) for x in known.x + np.diag(steps)]
+    last = [start.at(np.append(start.x[:-1], step)).machine for start in starts]
+    left = missing([known.machine, *moved, *last])
+    slopes = np.nan_to_num((left[1:] - left[0]) / np.append(steps, [step] * len(starts))[:, None])
+    own, further = slopes[: len(members)], slopes[len(members) :]
+    costs = []
+    for start, slope in zip(starts, further, strict=True):
+        kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
+        costs.append(_least(start, left[0], np.vstack([own[kept], slope])))
+    best = np.argsort(costs)[:MOST_FITTED]
+    return {starts[k].unknowns.members[-1].path: starts[k] for k in best}
+
+
+def _least(start: Trial, left: Array, slopes: Array) -> float:
+    """Return half the sum of soft squares of what is left, (n,), by straight lines, (k, n)."""
+    held = np.where(start.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, HELD)
+    drawn = np.where(start.unknowns.toleranced, -held * start.x, 0.0)
+    low, high = start.unknowns.bounds
+    room = low - start.x - ROUNDING, high - start.x + ROUNDING  # the solver wants some
+    change = lsq_linear(np.vstack([slopes.T, np.diag(held)]), np.append(-left, drawn), room).x
+    return float(np.sum(np.sqrt(1.0 + (left + change @ slopes) ** 2) - 1.0))
+
+
+def _fitted(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:
+    """Return a trial fitted, if no balance speaks then and the free run is at the noise."""
+    if np.any(evidence.fitted):
+        start = fit_balances(start, evidence, floor)
+        if not leaves_quiet(start, evidence):
+            return None
+    fitted = fit_free_run(start, evidence)
+    enough = at_noise(fitted, evidence) and leaves_quiet(fitted, evidence)
+    return with_spread(fitted, evidence) if enough else None

@@ -319,7 +319,8 @@ class _Window:
     def __call__(self, signal: Array) -> Array:
         count = signal.size - self._span + 1
         views = sliding_window_view(signal[self._first :], self._size)[:count]
-        return np.asarray(views[:: self._every] @ self._weights)
+        with np.errstate(invalid="ignore", over="ignore"):  # of a machine that cannot be
+            return np.asarray(views[:: self._every] @ self._weights)
 
 
 def _integral(rate: Array, period: float) -> Array:

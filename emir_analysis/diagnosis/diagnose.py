@@ -12,7 +12,16 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.misstated import misstated
 from emir_analysis.diagnosis.search import Search, Tried
-from emir_analysis.diagnosis.select import at_noise, limits, quiet
+from emir_analysis.diagnosis.select import (
+    LEFT,
+    STRONG,
+    at_noise,
+    beyond,
+    excess,
+    free_run_score,
+    limits,
+    quiet,
+)
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.telling import open_shares
@@ -23,6 +32,7 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
 
+MANY = 3  # effects
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 
 
@@ -79,6 +89,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         final = search.whole.plainer(search.whole.fitted(chosen))
         after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
     verdict = _verdict(final, after, evidence, rivals=len(best) - 1)
+    replaced = _misstated(final, verdict, search, evidence, progress)
+    verdict = "unexplained" if replaced else verdict
     curves, with_curve = Curves(search.balanced, evidence, search.floor), None
     if verdict == "found" and not at_noise(final, evidence):
         verdict, with_curve = _doubted(final, curves, progress)
@@ -93,12 +105,9 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     lies = None if speaking is None else _where(evidence, after, floor, speaking)
-    replaced: list[Trial] = []
-    if verdict == "unexplained" and with_curve is None:
-        progress("asking whether one value of the data sheet is another")
-        replaced = misstated(search.balanced, evidence, search.floor)
-        if speaking is not None and not replaced:
-            with_curve = _measured(curves, chosen, search, evidence, progress)
+    named = verdict != "unexplained" or bool(replaced) or with_curve is not None
+    if speaking is not None and not named:
+        with_curve = _measured(curves, chosen, search, evidence, progress)
     added = next(iter(replaced), with_curve)
     if added is not None:
         final, after = added, evidence.residuals([added.machine])[0]
@@ -123,6 +132,24 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         misstated=tuple(replaced),
         curve=None if with_curve is None else curve(final.machine),
     )
+
+
+def _misstated(
+    named: Trial, verdict: str, search: Search, evidence: Evidence, progress: Progress
+) -> list[Trial]:
+    """Return the values of the sheet one of which says clearly better what effects leave.
+
+    named: the effects, and the verdict on them. Of three none alone is like what is missing.
+    """
+    enough = excess(named, evidence) <= beyond(LEFT) and len(named.effects) < MANY
+    if verdict == "nothing_missing" or (verdict != "unexplained" and enough):
+        return []
+    progress("asking whether one value of the data sheet is another")
+    found = misstated(search.balanced, evidence, search.floor)
+    if verdict == "unexplained" or not found:
+        return found
+    limit = free_run_score(named, evidence, seen=0.0) - STRONG
+    return found if free_run_score(found[0], evidence, seen=0.0) < limit else []
 
 
 def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Trial | None]:

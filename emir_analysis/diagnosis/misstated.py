@@ -118,8 +118,6 @@ def _fitted(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:
     """Return a trial fitted, if no balance speaks then and the free run is at the noise."""
     if np.any(evidence.fitted):
         start = fit_balances(start, evidence, floor)
-        if not leaves_quiet(start, evidence):
-            return None
     fitted = fit_free_run(start, evidence)
     enough = at_noise(fitted, evidence) and leaves_quiet(fitted, evidence)
     return with_spread(fitted, evidence) if enough else None

@@ -143,7 +143,7 @@ def _misstated(findings: Findings) -> str:
         said.append(f"{about.path} = {about.value(value):.4g}{unit} for {about.origin:.4g}{unit}")
     left = math.sqrt(mean_square(findings.misstated[0], findings.evidence))
     return (
-        f"no effect explains it, but another value in the data sheet does: {' or '.join(said)},"
+        f"what explains it is no effect but another value in the data sheet: {' or '.join(said)},"
         f" with which the free run of {findings.evidence.name} is {left:.2f} times the noise off"
     )
 

@@ -12,7 +12,9 @@ from emir_analysis.blind.turns import KINDS
 from emir_analysis.cli import main
 
 HERE = Path(__file__).parent
-FOREIGN, THIRD = [(HERE / name).read_text() for name in ("foreign.py", "foreign_third.py")]
+FOREIGN, THIRD, STATED = [
+    (HERE / name).read_text() for name in ("foreign.py", "foreign_third.py", "foreign_stated.py")
+]
 
 
 def test_edges_that_close_along_the_stroke_have_no_name_but_a_curve(tmp_path: Path) -> None:
@@ -58,3 +60,17 @@ def test_a_pump_that_hunts_has_no_name_but_a_period(tmp_path: Path) -> None:
     assert f"swings with a period of {swing['period']:.3g} s" in outcome.statement
     amplitude = {command: row for command, _, row in swing["table"]}
     assert amplitude[max(amplitude)] > 10.0 * amplitude[min(amplitude)]  # the pump lifts
+
+
+def test_a_value_that_the_data_sheet_states_wrongly_is_told(tmp_path: Path) -> None:
+    """Other return edges of the spool, in the second model."""
+    plan = Plan(seed=61, duration=25.0, foreign=STATED, only=("other_throttle",))
+    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    assert outcome.hidden == ["other_throttle"]
+    assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
+    assert max(outcome.errors["refitted"].values()) > 5.0
+    assert max(outcome.errors["with_effect"].values()) < 1.1
+    (answer,) = tmp_path.glob("*/answer.json")
+    best, *_ = json.loads(answer.read_text())["misstated"]
+    assert best["name"] == "resistances.k_meter_out_lifting"
+    assert best["wanted"]["value"] / best["stated"] == pytest.approx(outcome.sizes["factor"], 0.01)

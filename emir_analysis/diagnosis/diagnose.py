@@ -32,7 +32,7 @@ from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet
 
-MANY = 3  # effects
+SEVERAL = 3  # effects: more likely one thing that none of them is
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 
 
@@ -141,7 +141,7 @@ def _misstated(
 
     named: the effects, and the verdict on them. Of three none alone is like what is missing.
     """
-    enough = excess(named, evidence) <= beyond(LEFT) and len(named.effects) < MANY
+    enough = excess(named, evidence) <= beyond(LEFT) and len(named.effects) < SEVERAL
     if verdict == "nothing_missing" or (verdict != "unexplained" and enough):
         return []
     progress("asking whether one value of the data sheet is another")

@@ -1,8 +1,11 @@
 """The pictures of a diagnosis."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, StrMethodFormatter
 
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.curves import Curve
@@ -49,6 +52,10 @@ PART = {  # of a curve, by the unit of its points
 }
 
 
+TIMES_NOISE = [sign * 10.0**k for sign in (-1, 1) for k in range(1, 7)] + [0.0]  # ticks of errors
+LEGEND: dict[str, Any] = {"ncols": 4, "fontsize": 8, "loc": "outside upper left"}
+
+
 def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
     """Show each measured signal and its simulations, and the errors beside it.
 
@@ -73,8 +80,11 @@ def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
         signal.set_ylabel(label)
         beside.set_ylabel("error / noise")
         beside.set_yscale("symlog", linthresh=5.0)
+        beside.yaxis.set_major_locator(FixedLocator(TIMES_NOISE))
+        beside.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         _tidy(signal, beside)
-    axes[0, 0].legend(ncols=4, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    # of the figure: beside the left axes it would push the right ones away
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), **LEGEND)
     axes[-1, 0].set_xlabel("time, s")
     axes[-1, 1].set_xlabel("time, s")
     return figure

@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, fit_balances, with_spread
 from emir_analysis.diagnosis.curves import Curve, curve
+from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
@@ -50,7 +53,7 @@ class Findings:
     loudest or that which swings with time, shape: of its residual, swing: how that swings, where:
     most of it lies. misstated: parameters with one value of the sheet replaced, their last unknown,
     where that explains what no effect does, the best first; curve: what has no name. With either
-    `chosen` and `after` then are.
+    `chosen` and `after` then are. drift: of a size, where that makes most of what is left.
     """
 
     evidence: Evidence
@@ -72,6 +75,7 @@ class Findings:
     where: Where | None
     misstated: tuple[Trial, ...]
     curve: Curve | None
+    drift: Drift | None
 
 
 def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
@@ -109,6 +113,9 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if speaking is not None and not named:
         with_curve = _measured(curves, chosen, search, evidence, progress)
     added = next(iter(replaced), with_curve)
+    drifts = None
+    if verdict == "unexplained" and added is None and np.any(evidence.fitted):
+        drifts = drift(search.balanced, evidence, search.floor)
     if added is not None:
         final, after = added, evidence.residuals([added.machine])[0]
     return Findings(
@@ -131,6 +138,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         where=lies,
         misstated=tuple(replaced),
         curve=None if with_curve is None else curve(final.machine),
+        drift=drifts,
     )
 
 

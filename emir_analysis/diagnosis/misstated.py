@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.candidates import (
     FREE_RUN_STEP,
@@ -22,8 +21,9 @@ from emir_analysis.diagnosis.candidates import (
 )
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, HELD, TOLERANCE_SPREAD, steps_inside
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
 from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_score, leaves_quiet
+from emir_analysis.diagnosis.straight import least
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -99,19 +99,11 @@ def _promising(
     costs = []
     for start, slope in zip(starts, further, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
-        costs.append(_least(start, left[0], np.vstack([own[kept], slope])))
+        straight = np.vstack([own[kept], slope]).T
+        _, rest = least(start.unknowns, start.x, left[0], straight)
+        costs.append(float(np.sum(np.sqrt(1.0 + rest**2) - 1.0)))  # large ones by their size
     best = np.argsort(costs)[:MOST_FITTED]
     return {starts[k].unknowns.members[-1].path: starts[k] for k in best}
-
-
-def _least(start: Trial, left: Array, slopes: Array) -> float:
-    """Return half the sum of soft squares of what is left, (n,), by straight lines, (k, n)."""
-    held = np.where(start.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, HELD)
-    drawn = np.where(start.unknowns.toleranced, -held * start.x, 0.0)
-    low, high = start.unknowns.bounds
-    room = low - start.x - ROUNDING, high - start.x + ROUNDING  # the solver wants some
-    change = lsq_linear(np.vstack([slopes.T, np.diag(held)]), np.append(-left, drawn), room).x
-    return float(np.sum(np.sqrt(1.0 + (left + change @ slopes) ** 2) - 1.0))
 
 
 def _fitted(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:

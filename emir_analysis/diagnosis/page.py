@@ -7,6 +7,7 @@ import numpy as np
 from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.error_tests import ErrorTests
 from emir_analysis.diagnosis.judged import Judged
 from emir_analysis.diagnosis.pictures import (
@@ -158,10 +159,12 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
 
 
 def _what_is_left(findings: Findings, result: Diagnosis) -> list[Block]:
-    """Return what no effect explains: as a curve, else as what swings, else over a signal."""
+    """Return what no effect explains: a curve, else what drifts or swings, else over a signal."""
     shape = result.shape
     if result.curve is not None:
         return _curve(result.curve)
+    if result.drift is not None:
+        return _drift(result.drift)
     if result.swing is not None:
         return _swing(result.swing, findings, result)
     if shape is None or findings.speaking is None or not shape.share > PREDICTED_SHARE:
@@ -199,6 +202,17 @@ def _swing(swing: Swing, findings: Findings, result: Diagnosis) -> list[Block]:
             swing.table,
             "The same in numbers.",
         ),
+    ]
+
+
+def _drift(drift: Drift) -> list[Block]:
+    return [
+        Table(
+            ("size of an effect", "at the begin", "at the end", "unit"),
+            [(drift.path.removeprefix("effects."), drift.begin, drift.end, drift.unit)],
+            f"It makes {100 * drift.share:.0f} % of what the balances lack when it goes linearly "
+            "along the recording; no effect of the registry does.",
+        )
     ]
 
 

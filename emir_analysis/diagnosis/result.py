@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.error_tests import ErrorTests, error_tests
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
@@ -170,6 +171,7 @@ class Diagnosis:
     where: Where | None
     misstated: tuple[MisstatedResult, ...]
     curve: Curve | None
+    drift: Drift | None
     at_end: tuple[str, ...]
     untold: dict[str, str]
     control: dict[str, ControlResult]
@@ -207,6 +209,7 @@ def diagnosis(
         where=findings.where,
         misstated=tuple(_misstated(trial, findings.evidence) for trial in findings.misstated),
         curve=findings.curve,
+        drift=findings.drift,
         at_end=at_end(findings),
         untold=untold(findings.evidence),
         control=control or {},

@@ -9,6 +9,7 @@ from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
@@ -92,6 +93,8 @@ def _remainder(findings: Findings) -> str:
     )
     if findings.curve is not None or findings.misstated:
         return keeps
+    if findings.drift is not None:
+        return f"{keeps}; {_drifting(findings.drift)}"
     keeps += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
     if speaking == "force" and _is_untold(shape, findings.swing, lies):
         keeps += (
@@ -132,6 +135,15 @@ def _undecided(findings: Findings) -> str:
                 f" {value:.0f} is taken: in {best} they differ by {apart:.0f} times the noise"
             )
     return words
+
+
+def _drifting(drift: Drift) -> str:
+    unit = "" if drift.unit == "1" else f" {drift.unit}"
+    return (
+        f"{drift.path.removeprefix('effects.')} that goes from {drift.begin:.3g} to"
+        f" {drift.end:.3g}{unit} along the recording makes {100 * drift.share:.0f} % of what the"
+        " balances lack"
+    )
 
 
 def _misstated(findings: Findings) -> str:

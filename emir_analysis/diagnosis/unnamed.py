@@ -11,8 +11,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW, level
 from emir_analysis.diagnosis.candidates import (
@@ -27,7 +25,6 @@ from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, e
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import (
     DIFFERENCE_STEP,
-    TOLERANCE_SPREAD,
     Problem,
     fit,
     steps_inside,
@@ -42,6 +39,7 @@ from emir_analysis.diagnosis.select import (
     quiet,
     score,
 )
+from emir_analysis.diagnosis.straight import least
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -214,9 +212,12 @@ class _Balances:
         machine = with_values(self._known.machine, self._named(kind) | values)
         pushed = self._evidence.in_noise(self._evidence.residuals([machine]), self._floor)[0]
         slope = np.nan_to_num(pushed - self._missing)[:, None]
-        anything = np.array([np.inf])
-        _, left = self._least(slope, np.zeros((0, 1)), (-anything, anything))
-        return self._score(left, self._known.x.size + 1)
+        known = self._known
+        force = Unknown(f"{kind.group}.along", "N", 0.0, size, -np.inf, np.inf, 0.0, False)
+        both = Unknowns(known.unknowns.machine, (*known.unknowns.members, force))
+        slopes = np.hstack([self._slopes, slope])
+        _, left = least(both, np.append(known.x, 0.0), self._missing, slopes)
+        return self._score(left, both.start.size)
 
     def best(self, forms: Sequence[_Form]) -> _Begun | None:
         """Return the trial with the curves that the balances prefer, if there is any."""
@@ -275,29 +276,13 @@ class _Balances:
         bending = np.asarray(np.kron(np.eye(count), BENDING), dtype=np.float64)
         machine = with_values(known.machine, form.named)
         everything = Unknowns(machine, (*known.unknowns.members, *form.points))
-        x, left = self._least(form.slopes, bending, Unknowns(machine, form.points).bounds)
+        begin = np.append(known.x, np.zeros(len(form.points)))
+        expected = np.hstack([np.zeros((len(bending), known.x.size)), bending])
+        slopes = np.hstack([self._slopes, form.slopes])
+        x, left = least(everything, begin, self._missing, slopes, expected)
         share = 1.0 - _above_noise(left) / _above_noise(self._missing)
         criterion = self._criterion(left, form.slopes, bending)
         return _Begun(_with_smoothing(everything, x), criterion, share)
-
-    def _least(
-        self, slopes: Array, expected: Array, bounds: tuple[Array, Array]
-    ) -> tuple[Array, Array]:
-        """Return parameters and what is beside them by least squares, (k + j,), and the rest, (n,).
-
-        Parameters are expected to be as stated. slopes: (n, j) by what is beside them; expected:
-        (r, j), of which it is expected to make little; bounds: (j,) each, of it.
-        """
-        known = self._known
-        stated = np.diag(np.where(known.unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0))
-        straight = np.hstack([self._slopes, slopes])
-        rows = np.vstack([straight, block_diag(stated, expected)])
-        wanted = np.concatenate([-self._missing, -stated @ known.x, np.zeros(len(expected))])
-        begin = np.append(known.x, np.zeros(slopes.shape[1]))
-        low, high = map(np.append, known.unknowns.bounds, bounds)
-        room = low - begin - ROUNDING, high - begin + ROUNDING  # the solver wants some
-        x = np.clip(begin + lsq_linear(rows, wanted, room).x, low, high)
-        return x, self._missing + straight @ (x - begin)
 
     def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
         """Return a Bayesian criterion of what is left, (n,), in units of the noise.

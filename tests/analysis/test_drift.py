@@ -1,0 +1,57 @@
+"""What changes along a recording, told by the balances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import recorded
+from operated import moved, operated
+
+from emir_analysis.diagnosis.candidates import fit_balances, trial
+from emir_analysis.diagnosis.drift import Drift, drift
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import Experiment
+from emir_common.parameter_tree import with_values
+from emir_plant.sheet import Sheet, joint1
+
+H = 1  # column of p_H in the outputs
+
+
+def asked(experiment: Experiment) -> Drift | None:
+    sheet = Sheet(joint1(), {"cylinder.beta": 0.1, "valve.flow_nominal": 0.03}, {}, ())
+    evidence = Evidence([experiment], sheet.machine)
+    floor = evidence.floor(sheet.machine)
+    return drift(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
+
+
+def test_a_gauge_that_drifts_is_told_with_both_ends() -> None:
+    run = moved(joint1(), 30.0, seed=6)
+    outputs = run.outputs.copy()
+    outputs[:, H] += np.linspace(-1e5, 5e5, len(outputs))
+    found = asked(replace(run, outputs=outputs))
+    assert found is not None
+    assert found.path == "effects.sensor_bias.pressure_lifting"
+    assert (found.begin, found.end) == pytest.approx((-1e5, 5e5), abs=0.3e5)
+
+
+def test_a_valve_whose_null_moves_is_told() -> None:
+    """The command that the valve follows is another than the one that was recorded."""
+    commands = recorded.moves(30.0, 6)
+    run = operated(joint1(), commands + np.linspace(0.0, 0.03, commands.size))
+    found = asked(replace(run, commands=operated(joint1(), commands).commands))
+    assert found is not None
+    assert found.path == "effects.valve_null_offset.offset"
+    assert (found.begin, found.end) == pytest.approx((0.0, 0.03), abs=0.005)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"effects.sensor_bias.pressure_lifting": 3e5},
+        {"effects.internal_leakage.coefficient": 5e-12},
+        {"geometry.modal_damping": 0.06},
+    ],
+    ids=str,
+)
+def test_what_is_steady_does_not_drift(values: dict[str, float]) -> None:
+    assert asked(moved(with_values(joint1(), values), 30.0, seed=6)) is None

@@ -7,6 +7,7 @@ friction falls behind the break-away and rises with speed lies between two windo
 so the fullest law is fitted, and what is not needed is left out.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -54,6 +55,13 @@ STICKING_STEP = 3e-3  # as fit.DIFFERENCE_STEP: over longer ones the piston stic
 ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest is gone is asked
 
 Method = Callable[[Problem, float], Solution]
+Limit = Callable[[Evidence], float]
+
+
+def _anything(part: Evidence) -> float:
+    """Return the most that may be left over a beginning where nothing is given up."""
+    del part
+    return math.inf
 
 
 def begun(start: Trial, evidence: Evidence, floor: Array, most: float = OFF) -> Trial | None:
@@ -154,9 +162,21 @@ def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Grown
 
     It is given up where it falls behind a rival that was fitted to more than that beginning.
     """
+    if rival is None:
+        return _grown(known, evidence, _anything)
+    return _grown(known, evidence, lambda part: WORSE * _misfit(rival, part))
+
+
+def grown_at_noise(known: Trial, evidence: Evidence) -> Grown | None:
+    """Return the same if it is at the noise; given up where it clearly no longer is."""
+    found = _grown(known, evidence, lambda _: OFF)
+    return found if found.left <= AT_NOISE else None
+
+
+def _grown(known: Trial, evidence: Evidence, limit: Limit) -> Grown:
     end = max(float(e.time[-1]) for e in evidence.experiments)
     x = _at_rest(known, evidence)
-    fitted = _led(known, evidence, x, DECIDED, end, descended, rival)
+    fitted = _led(known, evidence, x, DECIDED, end, descended, limit)
     return Grown(known.continued(fitted), fitted.misfit)
 
 
@@ -184,7 +204,7 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     time: float,
     end: float,
     method: Method,
-    rival: Trial | None = None,
+    limit: Limit = _anything,
 ) -> Solution:
     """Fit to beginnings that grow from a time to another, s.
 
@@ -192,7 +212,8 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     them: of machines drawn from what the beginning before leaves open one goes on whose instants
     are the machine's (a particle filter's step, Gordon et al. 1993). Where even that leaves more
     than before, the law is off, not one stick, and less is spent on it from there on. Friction that
-    comes along the way lets a fit find back by itself.
+    comes along the way lets a fit find back by itself. Given up where it leaves more over a
+    beginning than the limit allows.
     """
     smooth = is_along_the_way(known)
     fitted, holds = _fitted(known, evidence.until(time), x, FREE_RUN_ACCURACY, method), True
@@ -211,7 +232,7 @@ def _led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
             draws = DRAWS_EARLY if longer <= EARLY else DRAWS
             fitted = _found_again(known, part, fitted, method, draws if holds else 1)
             holds = holds and fitted.misfit <= AS_BEFORE * before
-        if not followed and rival is not None and fitted.misfit > WORSE * _misfit(rival, part):
+        if not followed and fitted.misfit > limit(part):
             break
         time = longer
     return fitted

@@ -30,7 +30,7 @@ from emir_analysis.diagnosis.friction_laws import (
 )
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT, STRONG, beyond, excess, free_run_score
-from emir_analysis.diagnosis.stick_slip import Grown, follows_the_beginning, grown
+from emir_analysis.diagnosis.stick_slip import Grown, follows_the_beginning, grown, grown_at_noise
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
@@ -228,12 +228,9 @@ class Whole:
             other = grown(gradual(law), self._evidence, rival)
             if other.left < found.left:
                 found, fuller = other, [gradual(more) for more in fuller]
-        for more in fuller:
-            if found.left <= AT_NOISE:
-                break
-            led = grown(more, self._evidence, rival)
-            if led.left <= AT_NOISE:
-                found = led
+        if found.left > AT_NOISE:
+            all_at_noise = (grown_at_noise(more, self._evidence) for more in fuller)
+            found = next((led for led in all_at_noise if led is not None), found)
         return found
 
     def _heard(self, led: Trial) -> Trial:

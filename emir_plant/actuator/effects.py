@@ -201,7 +201,7 @@ class CoulombFriction(Effect):
     }
 
     force: float = quantity("pressure", 0.0, 10.0, "F_c over the area", default=0.0)
-    smoothing_speed: float = quantity("pressure/time", 0.01, 0.5, "v_0", default=0.03)
+    smoothing_speed: float = quantity("pressure/time", 0.0005, 0.5, "v_0", default=0.03)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
@@ -223,7 +223,7 @@ class StribeckFriction(Effect):
     force: float = quantity("pressure", 0.0, 5.0, "F_c over the area", default=0.0)
     breakaway: float = quantity("pressure", 0.0, 5.0, "F_s - F_c over the area", default=0.0)
     velocity: float = quantity("pressure/time", 0.02, 5.0, "v_s", default=0.1)
-    smoothing_speed: float = quantity("pressure/time", 0.02, 0.5, "v_0", default=0.03)
+    smoothing_speed: float = quantity("pressure/time", 0.0005, 0.5, "v_0", default=0.03)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 
@@ -243,7 +243,7 @@ class PressureDependentFriction(Effect):
 
     coefficient: float = quantity("1", 0.0, 0.5, "mu", default=0.0)
     rest: float = quantity("pressure", 0.0, 10.0, "p_rest, at which p is 0", default=1.0)
-    smoothing_speed: float = quantity("pressure/time", 0.02, 0.5, "v_0", default=0.03)
+    smoothing_speed: float = quantity("pressure/time", 0.0005, 0.5, "v_0", default=0.03)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
 
 

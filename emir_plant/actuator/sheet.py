@@ -39,8 +39,17 @@ class ActuatorSheet:
 
 
 def is_actuator(path: Path) -> bool:
-    """Return whether a data sheet describes an actuator. Raises ParameterError as `read_map`."""
-    return bool(read_map(path, what="parameters").get("machine") == MACHINE)
+    """Return whether a data sheet describes an actuator.
+
+    Raises ParameterError as `read_map`, and for one that does but is not called so.
+    """
+    content = read_map(path, what="parameters")
+    called, valve = content.get("machine"), content.get("valve")
+    if called != MACHINE and isinstance(valve, dict) and "gain" in valve:
+        raise ParameterError(
+            f"{path}: machine = {called!r}: valve.gain is an actuator's: {MACHINE!r} is meant?"
+        )
+    return bool(called == MACHINE)
 
 
 def load_actuator(path: Path) -> ActuatorSheet:

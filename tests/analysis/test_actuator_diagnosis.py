@@ -107,6 +107,38 @@ def test_an_effect_is_found_and_carries_to_the_other_recording(
     assert np.sqrt(np.mean(error**2)) == pytest.approx(signal.with_effect, rel=1e-6)
 
 
+@pytest.mark.parametrize(("law", "lacking"), [(_proportional, []), (_limited, ["flow_limit"])])
+def test_a_sheet_that_leaves_nothing_open_is_asked_what_it_lacks(
+    folder: Path, law: recorded.Flow, lacking: list[str]
+) -> None:
+    exact = f"""\
+machine: actuator
+time_unit: sample
+valve: {{gain: {recorded.GAIN}, time_constant: {recorded.LAG}}}
+load: {{frequency: {recorded.FREQUENCY}, viscous_friction: {recorded.FRICTION}}}
+sensor: {{pressure_noise: {recorded.NOISE}}}
+"""
+    (folder / "sheet.yaml").write_text(exact)
+    result = _diagnose(folder, *recorded.record(folder, law))
+    assert result.verdict == ("found" if lacking else "nothing_missing"), summary(result)
+    assert [effect.name for effect in result.effects] == lacking
+    assert result.parameters == {}
+
+
+def test_what_no_recording_can_tell_apart_is_ambiguous(folder: Path) -> None:
+    """A valve that is not shut at zero, for long, and a steady load: at rest both are the same."""
+    opening = np.append(np.zeros(150), recorded.moves(450, 1))
+    oil = recorded.pressure(opening, lambda spool, _: recorded.GAIN * (spool + 0.15))
+    oil += recorded.NOISE * np.random.default_rng(2).standard_normal(oil.size)
+    recorded.write(folder / "crept", opening[130:], oil[130:])
+    result = _diagnose(folder, folder / "crept", None)
+    assert result.verdict == "ambiguous", summary(result)
+    told = {effect.name for effect in result.effects}.union(
+        *(r.split(" and ") for r in result.rivals)
+    )
+    assert told == {"external_load", "valve_null_offset"}
+
+
 def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
     """Beyond a relief valve's setting alone anything changes, and the gain makes up for it."""
 
@@ -253,8 +285,8 @@ def test_a_judge_of_no_use_does_not_lose_what_was_found(
         (lambda u, p: (0.0 * u, p), "valve_opening is constant"),
         (lambda u, p: (u, 0.0 * p + 3.0), "oil_pressure is constant"),
         (lambda u, p: (u[:50], p[:50]), "record at least 200"),
-        (lambda u, p: (u, 200.0 * p), "data sheet's values with it, by 100"),
-        (lambda u, p: (100.0 * u, p), "valve_opening is of the size"),
+        (lambda u, p: (u, 200.0 * p), "valve.gain and sensor.pressure_noise by 100"),
+        (lambda u, p: (100.0 * u, p), "by 100 and multiply the data sheet's valve.gain by that"),
     ],
 )
 def test_a_recording_of_no_use_is_told(

@@ -50,8 +50,6 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     """
     check_outputs([json, html, model_out], predictions, [datasheet, signals, bag, judge])
     sheet = load_actuator(datasheet)
-    if not sheet.ranges:
-        raise InputError(f"{datasheet}: no parameter has a range, nothing to fit")
     if judge is not None and not judge.exists():
         raise InputError(f"{judge}: no such recording")
     signal_map = read_signal_map(signals)

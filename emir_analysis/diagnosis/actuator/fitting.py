@@ -75,7 +75,7 @@ class Fitted:
     """A machine fitted with effects: x (k,) at the optimum, its covariance (k, k), rms error.
 
     evidence: logarithm of the recording's probability under these effects, whatever their sizes
-    (Laplace's approximation), up to a constant of the recording.
+    (Laplace's approximation), likelihood: with these sizes, both up to a constant of the recording.
     """
 
     effects: tuple[str, ...]
@@ -85,6 +85,7 @@ class Fitted:
     covariance: Array
     rms: float
     evidence: float
+    likelihood: float
 
     @property
     def name(self) -> str:
@@ -257,6 +258,8 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     """
     begun = []
     members = unknowns(sheet, effects)
+    if not members:
+        return _as_stated(sheet, _Surplus(sheet, members, record, noise, seen))
     ways = _ways(members)
     for way in ways:
         surplus = _Surplus(sheet, way, record, noise, seen)
@@ -272,6 +275,14 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     ended = begun if thorough else begun[:ENDED]
     fits = [_ended(sheet, effects, surplus, found.x) for surplus, found in ended]
     return max(fits, key=lambda fitted: fitted.evidence)
+
+
+def _as_stated(sheet: ActuatorSheet, surplus: _Surplus) -> Fitted:
+    """Return the machine of a data sheet that leaves nothing open."""
+    nothing = np.zeros(0)
+    rms = max(surplus.rms(nothing), surplus.exact)
+    likely = -surplus.improbable(rms)
+    return Fitted((), (), sheet.machine, nothing, np.zeros((0, 0)), rms, likely, likely)
 
 
 def _ended(
@@ -294,6 +305,7 @@ def _ended(
         -surplus.unexpected(best.x)
         - surplus.improbable(rms)
         - narrowed(best.jac, surplus.deviation),
+        -surplus.improbable(max(surplus.rms(best.x), surplus.exact)),
     )
 
 

@@ -118,10 +118,13 @@ def open_judge(path: Path, signal_map: SignalMap, record: ActuatorRecord) -> Act
 def _check_scale(path: Path, name: str, size: float) -> None:
     """Raise InputError where a signal is not scaled as the effects' sizes are."""
     if not 1.0 / NOT_OF_ORDER_ONE <= size <= NOT_OF_ORDER_ONE:
+        by = f"{10.0 ** round(math.log10(size)):g}"
+        then = f"divide it, the data sheet's valve.gain and sensor.pressure_noise by {by}"
+        if name == OPENING:
+            then = f"divide it by {by} and multiply the data sheet's valve.gain by that"
         raise InputError(
             f"{path}: {name} is of the size {size:.3g}; effects are looked for in signals of the"
-            " order of one: divide it, and the data sheet's values with it, by"
-            f" {10.0 ** round(math.log10(size)):g}"
+            f" order of one: {then}"
         )
 
 

@@ -72,6 +72,8 @@ def search(
     ordered = _first(tried.values(), len(tried))
     plain = tried[frozenset()]
     chosen, rivals = _choice(ordered)
+    if chosen.rms <= AT_NOISE * noise:
+        rivals += [f for f in ordered if f not in rivals and _does_as_well(f, chosen)]
     if plain.rms <= AT_NOISE * noise and _better(chosen, plain) < STRONG:
         chosen, rivals = plain, []
     shown = [plain, chosen, *rivals]
@@ -127,6 +129,18 @@ def _choice(ordered: list[Fitted]) -> tuple[Fitted, list[Fitted]]:
     as_good = [f for f in ordered if _probable(f) > _probable(ordered[0]) - BARE_MENTION]
     chosen = min(as_good, key=lambda f: f.x.size)
     return chosen, [f for f in as_good if f is not chosen and f.x.size <= chosen.x.size]
+
+
+def _does_as_well(other: Fitted, chosen: Fitted) -> bool:
+    """Tell whether a set with another effect in place of one makes the recording as probable.
+
+    It may be less probable beforehand, such as a null offset of a sixth of the stroke beside a load
+    that does the same: no recording says that.
+    """
+    added, gone = _key(other) - _key(chosen), _key(chosen) - _key(other)
+    exchanged = len(added) == len(gone) == 1
+    as_likely = other.likelihood > chosen.likelihood - BARE_MENTION
+    return exchanged and as_likely and other.x.size <= chosen.x.size
 
 
 def _better(one: Fitted, other: Fitted) -> float:

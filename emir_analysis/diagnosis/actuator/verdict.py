@@ -40,8 +40,8 @@ def statement(word: str, found: Search, noise: float, curve: CurveResult | None)
         closest = f"{found.chosen.name} {come} closest; " if found.chosen.effects else ""
         told = _told(curve) if curve else ""
         return (
-            f"{closest}{left}: the balance of the {BALANCE} speaks, and no known effect says"
-            f" why{told}"
+            f"{closest}{left}: the balance of the {BALANCE}, the only one that opening and"
+            f" pressure allow, speaks, and no known effect says why{told}"
         )
     names = found.chosen.name
     if word == "ambiguous":

@@ -125,6 +125,21 @@ sensor: {{pressure_noise: {recorded.NOISE}}}
     assert result.parameters == {}
 
 
+def test_a_limit_that_is_not_reached_is_not_told(folder: Path) -> None:
+    """The pump limits lifting alone; lowering goes no faster than the valve lets it."""
+
+    def lifting_alone(spool: float, _: float) -> float:
+        return min(recorded.GAIN * spool, 0.5)
+
+    result = _diagnose(folder, *recorded.record(folder, lifting_alone))
+    (effect,) = result.effects
+    assert effect.name == "flow_limit", summary(result)
+    assert effect.parameters["lifting"].value == pytest.approx(0.5, rel=0.03)
+    assert "lowering" not in effect.parameters
+    signal = result.signals["oil_pressure"]
+    assert signal.with_effect < 1.2 * recorded.NOISE < 0.2 * signal.refitted
+
+
 def test_what_no_recording_can_tell_apart_is_ambiguous(folder: Path) -> None:
     """A valve that is not shut at zero, for long, and a steady load: at rest both are the same."""
     opening = np.append(np.zeros(150), recorded.moves(450, 1))

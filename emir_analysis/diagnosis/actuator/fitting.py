@@ -93,6 +93,12 @@ class Fitted:
         return " and ".join(self.effects) or "parameters only"
 
 
+def sizes(effects: Sequence[str]) -> list[str]:
+    """Return the sizes, by dotted path, of those effects that have several."""
+    several = [name for name in effects if len(KNOWN[name].sizes) > 1]
+    return [f"effects.{name}.{size}" for name in several for size in KNOWN[name].sizes]
+
+
 def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...]:
     """Return what a data sheet leaves open and all parameters of the named effects."""
     stated = declared(sheet.machine)
@@ -245,6 +251,7 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
     drawn: int = 0,
     levels: bool = False,
     thorough: bool = False,
+    without: Sequence[str] = (),
 ) -> Fitted:
     """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
 
@@ -255,9 +262,10 @@ def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
 
     What in an effect is none or above some value is fitted both ways. With it fits begin where the
     effect is new or has it, `thorough` from every machine; places are drawn without it.
+    without: parameters, by dotted path, that stay as the sheet's machine has them.
     """
     begun = []
-    members = unknowns(sheet, effects)
+    members = tuple(m for m in unknowns(sheet, effects) if m.path not in without)
     if not members:
         return _as_stated(sheet, _Surplus(sheet, members, record, noise, seen))
     ways = _ways(members)

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numba
 import numpy as np
 
-from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error
+from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error, sizes
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.diagnosis.select import AT_NOISE, STRONG
 from emir_analysis.root_mean_square import rms
@@ -76,6 +76,7 @@ def search(
         rivals += [f for f in ordered if f not in rivals and _does_as_well(f, chosen)]
     if plain.rms <= AT_NOISE * noise and _better(chosen, plain) < STRONG:
         chosen, rivals = plain, []
+    chosen = _with_sizes_that_tell(sheet, record, noise, chosen)
     shown = [plain, chosen, *rivals]
     progress("parts left out")
     unseen = {f.name: unseen_error(sheet, f.effects, record, noise) for f in shown}
@@ -122,6 +123,24 @@ def _settle_below(
             known = tried.get(_key(fitted))
             if known is None or fitted.evidence > known.evidence:
                 tried[_key(fitted)] = fitted
+
+
+def _with_sizes_that_tell(
+    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, chosen: Fitted
+) -> Fitted:
+    """Return a set without those sizes of its effects without which it is as probable.
+
+    A limit of the flow that the recording only just reaches is none that it tells.
+    """
+    gone: list[str] = []
+    for path in sizes(chosen.effects):
+        without = [*gone, path]
+        fewer = fit(sheet, chosen.effects, record, noise, [chosen.machine], without=without)
+        _, effect, _ = path.split(".")
+        stays_on = getattr(fewer.machine.effects, effect).is_on
+        if stays_on and fewer.evidence > chosen.evidence - BARE_MENTION:
+            chosen, gone = fewer, without
+    return chosen
 
 
 def _choice(ordered: list[Fitted]) -> tuple[Fitted, list[Fitted]]:

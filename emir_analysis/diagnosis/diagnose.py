@@ -113,9 +113,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     if speaking is not None and not named:
         with_curve = _measured(curves, chosen, search, evidence, progress)
     added = next(iter(replaced), with_curve)
-    drifts = None
-    if verdict == "unexplained" and added is None and np.any(evidence.fitted):
-        drifts = drift(search.balanced, evidence, search.floor)
+    asked = verdict == "unexplained" and added is None and bool(np.any(evidence.fitted))
     if added is not None:
         final, after = added, evidence.residuals([added.machine])[0]
     return Findings(
@@ -138,7 +136,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         where=lies,
         misstated=tuple(replaced),
         curve=None if with_curve is None else curve(final.machine),
-        drift=drifts,
+        drift=drift(search.balanced, evidence, search.floor) if asked else None,
     )
 
 

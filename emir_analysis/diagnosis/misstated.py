@@ -42,7 +42,7 @@ def misstated(balanced: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
     The best first, and those that are as good. balanced: without effects, fitted to the balances.
     floor: (5,) of the balances.
     """
-    starts = [_replaced(balanced, unknown) for unknown in _values(balanced.unknowns.machine)]
+    starts = [_replaced(balanced, unknown) for unknown in _values(balanced)]
     near = evidence.until(astray(balanced, evidence) + SHORTEST)
     rest = [settled(balanced.machine, e, near) for e in near.experiments]
     found: dict[str, Trial] = {}
@@ -64,22 +64,26 @@ def misstated(balanced: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
     return [enough[k] for k in order if scores[k] < scores[order[0]] + STRONG]
 
 
-def _values(machine: Machine) -> list[Unknown]:
-    """Return the sheet's values that are no whole numbers and not zero, as their logarithms."""
-    found = []
-    for path, (about, value) in declared(machine).items():
+def _values(known: Trial) -> list[Unknown]:
+    """Return the sheet's values that are no whole numbers and not zero, as their logarithms.
+
+    A search starts where a trial has them.
+    """
+    found, fitted = [], declared(known.machine)
+    for path, (about, value) in declared(known.unknowns.machine).items():
         if path.partition(".")[0] in STATED and isinstance(value, float) and value > 0.0:
-            least = math.log(about.low / value) + ROUNDING if about.low > 0.0 else -LARGEST
-            low, high = max(least, -LARGEST), min(math.log(about.high / value), LARGEST) - ROUNDING
-            if low < 0.0 < high:
-                unknown = Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True)
-                found.append(unknown)
+            low = max(math.log(about.low / value), -LARGEST) if about.low > 0.0 else -LARGEST
+            high = min(math.log(about.high / value), LARGEST)
+            start = math.log(fitted[path][1] / value)
+            if low < start < high:
+                ends = low + ROUNDING, high - ROUNDING
+                found.append(Unknown(path, about.unit, value, 1.0, *ends, start, False, True))
     return found
 
 
 def _replaced(known: Trial, value: Unknown) -> Trial:
     """Return a trial with a value to be fitted, freed of its tolerance if it has one."""
-    return known.fixed(value.path, value.origin).also(value)
+    return known.fixed(value.path, value.value(value.start)).also(value)
 
 
 def _promising(
@@ -92,7 +96,7 @@ def _promising(
     members = known.unknowns.members
     steps = steps_inside(known.x, step, known.unknowns.bounds[1])
     moved = [known.unknowns.at(x) for x in known.x + np.diag(steps)]
-    last = [start.at(np.append(start.x[:-1], step)).machine for start in starts]
+    last = [start.at(np.append(start.x[:-1], start.x[-1] + step)).machine for start in starts]
     left = missing([known.machine, *moved, *last])
     slopes = np.nan_to_num((left[1:] - left[0]) / np.append(steps, [step] * len(starts))[:, None])
     own, further = slopes[: len(members)], slopes[len(members) :]

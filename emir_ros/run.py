@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -190,12 +191,14 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
                 node.check()
             take_the_rest(executor, *nodes.values())
     finally:
-        for node in nodes.values():
-            node.close()
-            node.destroy_node()
-        rclpy.try_shutdown()
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # nobody looks at `stop` any more
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with ExitStack() as ending:  # all of it, whatever fails; the last one first
+            # nobody looks at `stop` any more
+            ending.callback(signal.signal, signal.SIGTERM, signal.SIG_DFL)
+            ending.callback(signal.signal, signal.SIGINT, signal.default_int_handler)
+            ending.callback(rclpy.try_shutdown)
+            for node in reversed(nodes.values()):
+                ending.callback(node.destroy_node)
+                ending.callback(node.close)
     if stop.made:  # while it ended by itself: whoever called has more to do
         raise KeyboardInterrupt
 

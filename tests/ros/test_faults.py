@@ -212,6 +212,27 @@ def test_a_full_disk_ends_the_recording_and_keeps_it(tmp_path: Path) -> None:
     assert times == list(range(0, times[-1] + 1, PLANT_PERIOD_NS))  # nothing lost before
 
 
+def test_a_node_that_cannot_end_well_keeps_no_other_from_it(tmp_path: Path) -> None:
+    """All in one process: the machine is left in order, and the failure is one line."""
+    script = (
+        "import sys; from emir_ros.run import main; from emir_ros.shell import NodeError\n"
+        "from emir_ros.plant_node import PlantNode\n"
+        "from emir_ros.recorder_node import RecorderNode\n"
+        "def fail(self): raise NodeError('recorder_node: disk full')\n"
+        "RecorderNode.close = fail\n"
+        "PlantNode.close = lambda self: print('the machine has ended')\n"
+        "sys.exit(main(['--duration', '0.1', '--bag', sys.argv[1]]))"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "run")]
+    finished = subprocess.run(
+        command, capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
+    assert finished.returncode == 1
+    assert "the machine has ended" in finished.stdout
+    assert "emir run: recorder_node: disk full" in finished.stderr.splitlines()
+    assert "Traceback" not in finished.stderr
+
+
 def test_memory_stays_flat_in_lock_step(tmp_path: Path) -> None:
     """Between 10 s and 40 s of the run, by the recording's size, it grows by less than 1 %."""
     file = tmp_path / "run" / "run_0.mcap"

@@ -17,6 +17,8 @@ def least(
     (n, k). Toleranced parameters are expected as stated. expected: (r, k), of which it is
     expected of the change from x to make little.
     """
+    if not x.size:
+        return x, missing
     stated = np.where(unknowns.toleranced, 1.0 / TOLERANCE_SPREAD, 0.0)
     further = np.zeros((0, x.size)) if expected is None else expected
     rows = np.vstack([slopes, np.diag(stated), further])

@@ -17,18 +17,22 @@ from emir_plant.sheet import Sheet, joint1
 H = 1  # column of p_H in the outputs
 
 
-def asked(experiment: Experiment) -> Drift | None:
-    sheet = Sheet(joint1(), {"cylinder.beta": 0.1, "valve.flow_nominal": 0.03}, {}, ())
+TOLERANCES = {"cylinder.beta": 0.1, "valve.flow_nominal": 0.03}
+
+
+def asked(experiment: Experiment, tolerances: dict[str, float] = TOLERANCES) -> Drift | None:
+    sheet = Sheet(joint1(), tolerances, {}, ())
     evidence = Evidence([experiment], sheet.machine)
     floor = evidence.floor(sheet.machine)
     return drift(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
 
 
-def test_a_gauge_that_drifts_is_told_with_both_ends() -> None:
+@pytest.mark.parametrize("tolerances", [TOLERANCES, {}], ids=["tolerances", "exact"])
+def test_a_gauge_that_drifts_is_told_with_both_ends(tolerances: dict[str, float]) -> None:
     run = moved(joint1(), 30.0, seed=6)
     outputs = run.outputs.copy()
     outputs[:, H] += np.linspace(-1e5, 5e5, len(outputs))
-    found = asked(replace(run, outputs=outputs))
+    found = asked(replace(run, outputs=outputs), tolerances)
     assert found is not None
     assert found.path == "effects.sensor_bias.pressure_lifting"
     assert (found.begin, found.end) == pytest.approx((-1e5, 5e5), abs=0.3e5)

@@ -15,9 +15,9 @@ from emir_plant.sheet import Sheet, joint1
 TOLERANCES = {"cylinder.beta": 0.05, "cylinder.volume_lifting_0": 0.05}
 
 
-def asked(experiment: Experiment) -> list[Trial]:
+def asked(experiment: Experiment, tolerances: dict[str, float] = TOLERANCES) -> list[Trial]:
     """Return the answers for a recording of EMIR's joint 1 with the data sheet above."""
-    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    sheet = Sheet(joint1(), tolerances, {}, ())
     evidence = Evidence([experiment], sheet.machine)
     floor = evidence.floor(sheet.machine)
     return misstated(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
@@ -42,6 +42,11 @@ def test_a_value_that_is_another_is_told_with_its_size(path: str, value: float) 
     assert wanted.value(float(best.x[-1])) == pytest.approx(value, rel=0.03)
     low, high = wanted.deviation(float(best.x[-1]), 3.0 * float(best.spread[-1]))
     assert low < value < high
+
+
+def test_it_is_told_of_a_sheet_that_is_sure_of_all_its_values() -> None:
+    best, *_ = asked(recording({"geometry.modal_damping": 0.06}), {})
+    assert [unknown.path for unknown in best.unknowns.members] == ["geometry.modal_damping"]
 
 
 def test_it_is_told_without_any_pressure() -> None:

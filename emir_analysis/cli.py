@@ -257,7 +257,8 @@ def _diagnose_parser() -> argparse.ArgumentParser:
         prog="emir diagnose",
         description="What a machine has that its data sheet lacks: nothing_missing, found (which"
         " effects), ambiguous (which ones, and what would tell them apart) or unexplained (which"
-        " balance, how large, against what).",
+        " balance, how large, against what; another value in the data sheet that explains it, or"
+        " what drifts).",
     )
     parser.add_argument(
         "bag", type=Path, nargs="+", metavar="BAG", help="recordings of one machine to learn from"

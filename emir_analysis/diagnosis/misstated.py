@@ -31,7 +31,8 @@ from emir_plant.parameters import Machine
 
 STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block")  # groups
 LARGEST = math.log(10.0)  # of a value over the stated one, either way
-MOST_FITTED = 2  # of those that promise most on the balances, and on the free run
+MOST_FITTED = 2  # of those that promise most on the balances, and on the free run ...
+PROMISING = 0.8  # of what parameters alone leave, to first order: those that leave more do not
 
 Missing = Callable[[Sequence[Machine]], Array]  # (m, n) in units of the noise
 
@@ -60,8 +61,8 @@ def misstated(balanced: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
     fitted = [_fitted(start, evidence, floor) for start in found.values()]
     enough = [each for each in fitted if each is not None]
     scores = [free_run_score(each, evidence, seen=0.0) for each in enough]
-    order = np.argsort(scores)
-    return [enough[k] for k in order if scores[k] < scores[order[0]] + STRONG]
+    most = min(scores, default=0.0) + STRONG
+    return [enough[k] for k in np.argsort(scores) if scores[k] < most]
 
 
 def _values(known: Trial) -> list[Unknown]:
@@ -89,7 +90,7 @@ def _replaced(known: Trial, value: Unknown) -> Trial:
 def _promising(
     known: Trial, starts: Sequence[Trial], missing: Missing, step: float
 ) -> dict[str, Trial]:
-    """Return those trials, by the value's path, that leave least to first order.
+    """Return those trials, by the value's path, that leave least to first order, if clearly less.
 
     starts: with one unknown more than the known one or in place of one of its own.
     """
@@ -100,14 +101,20 @@ def _promising(
     left = missing([known.machine, *moved, *last])
     slopes = np.nan_to_num((left[1:] - left[0]) / np.append(steps, [step] * len(starts))[:, None])
     own, further = slopes[: len(members)], slopes[len(members) :]
+    limit = PROMISING * _soft(least(known.unknowns, known.x, left[0], own.T)[1])
     costs = []
     for start, slope in zip(starts, further, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
         straight = np.vstack([own[kept], slope]).T
         _, rest = least(start.unknowns, start.x, left[0], straight)
-        costs.append(float(np.sum(np.sqrt(1.0 + rest**2) - 1.0)))  # large ones by their size
-    best = np.argsort(costs)[:MOST_FITTED]
+        costs.append(_soft(rest))
+    best = [k for k in np.argsort(costs)[:MOST_FITTED] if costs[k] <= limit]
     return {starts[k].unknowns.members[-1].path: starts[k] for k in best}
+
+
+def _soft(left: Array) -> float:
+    """Return half the sum of soft squares: large ones count by their size."""
+    return float(np.sum(np.sqrt(1.0 + left**2) - 1.0))
 
 
 def _fitted(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:

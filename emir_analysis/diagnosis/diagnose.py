@@ -143,7 +143,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
 def _misstated(
     named: Trial, verdict: str, search: Search, evidence: Evidence, progress: Progress
 ) -> list[Trial]:
-    """Return the values of the sheet one of which says clearly better what effects leave.
+    """Return the values of the sheet one of which says clearly better what is left.
 
     named: the effects, and the verdict on them. Of three none alone is like what is missing.
     """
@@ -152,10 +152,9 @@ def _misstated(
         return []
     progress("asking whether one value of the data sheet is another")
     found = misstated(search.balanced, evidence, search.floor)
-    if verdict == "unexplained" or not found:
-        return found
-    limit = free_run_score(named, evidence, seen=0.0) - STRONG
-    return found if free_run_score(found[0], evidence, seen=0.0) < limit else []
+    rival = search.refitted if verdict == "unexplained" else named
+    limit = free_run_score(rival, evidence, seen=0.0) - STRONG
+    return found if found and free_run_score(found[0], evidence, seen=0.0) < limit else []
 
 
 def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Trial | None]:

@@ -15,16 +15,7 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.misstated import misstated
 from emir_analysis.diagnosis.search import Search, Tried
-from emir_analysis.diagnosis.select import (
-    LEFT,
-    STRONG,
-    at_noise,
-    beyond,
-    excess,
-    free_run_score,
-    limits,
-    quiet,
-)
+from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.telling import open_shares
@@ -151,10 +142,8 @@ def _misstated(
     if verdict == "nothing_missing" or (verdict != "unexplained" and enough):
         return []
     progress("asking whether one value of the data sheet is another")
-    found = misstated(search.balanced, evidence, search.floor)
     rival = search.refitted if verdict == "unexplained" else named
-    limit = free_run_score(rival, evidence, seen=0.0) - STRONG
-    return found if found and free_run_score(found[0], evidence, seen=0.0) < limit else []
+    return misstated(search.balanced, rival, evidence, search.floor)
 
 
 def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Trial | None]:

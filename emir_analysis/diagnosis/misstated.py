@@ -6,63 +6,52 @@ balances and on the free run for as long as that stays near; what promises most 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from emir_analysis.diagnosis.candidates import (
     FREE_RUN_STEP,
     Trial,
-    coarse_errors,
     fit_balances,
     fit_free_run,
-    settled,
     with_spread,
 )
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
+from emir_analysis.diagnosis.screening import Missing, in_balances, in_free_run, soft
 from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_score, leaves_quiet
 from emir_analysis.diagnosis.straight import least
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
-from emir_plant.parameters import Machine
 
 STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block")  # groups
 LARGEST = math.log(10.0)  # of a value over the stated one, either way
 MOST_FITTED = 2  # of those that promise most on the balances, and on the free run ...
 PROMISING = 0.8  # of what parameters alone leave, to first order: those that leave more do not
 
-Missing = Callable[[Sequence[Machine]], Array]  # (m, n) in units of the noise
 
-
-def misstated(balanced: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
+def misstated(balanced: Trial, rival: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
     """Return parameters with one value of the sheet replaced, the last unknown, if that suffices.
 
-    The best first, and those that are as good. balanced: without effects, fitted to the balances.
-    floor: (5,) of the balances.
+    And if it is clearly better than a rival: the best first, and those that are as good. balanced:
+    without effects, fitted to the balances. floor: (5,) of the balances.
     """
     starts = [_replaced(balanced, unknown) for unknown in _values(balanced)]
     near = evidence.until(astray(balanced, evidence) + SHORTEST)
-    rest = [settled(balanced.machine, e, near) for e in near.experiments]
-    found: dict[str, Trial] = {}
+    found = _promising(balanced, starts, in_free_run(balanced, near), FREE_RUN_STEP)
     if np.any(evidence.fitted):
-
-        def in_balances(machines: Sequence[Machine]) -> Array:
-            return evidence.in_noise(evidence.residuals(machines), floor)
-
-        found |= _promising(balanced, starts, in_balances, DIFFERENCE_STEP)
-
-    def in_free_run(machines: Sequence[Machine]) -> Array:
-        return coarse_errors(machines, near, rest)
-
-    found |= _promising(balanced, starts, in_free_run, FREE_RUN_STEP)
+        found |= _promising(balanced, starts, in_balances(evidence, floor), DIFFERENCE_STEP)
     fitted = [_fitted(start, evidence, floor) for start in found.values()]
     enough = [each for each in fitted if each is not None]
     scores = [free_run_score(each, evidence, seen=0.0) for each in enough]
-    most = min(scores, default=0.0) + STRONG
-    return [enough[k] for k in np.argsort(scores) if scores[k] < most]
+    limit = free_run_score(rival, evidence, seen=0.0) - STRONG
+    best = min(scores, default=math.inf)
+    if best >= limit:
+        return []
+    return [enough[k] for k in np.argsort(scores) if scores[k] < best + STRONG]
 
 
 def _values(known: Trial) -> list[Unknown]:
@@ -96,25 +85,20 @@ def _promising(
     """
     members = known.unknowns.members
     steps = steps_inside(known.x, step, known.unknowns.bounds[1])
-    moved = [known.unknowns.at(x) for x in known.x + np.diag(steps)]
-    last = [start.at(np.append(start.x[:-1], start.x[-1] + step)).machine for start in starts]
-    left = missing([known.machine, *moved, *last])
+    moved = [known.at(x) for x in known.x + np.diag(steps)]
+    last = [start.at(np.append(start.x[:-1], start.x[-1] + step)) for start in starts]
+    left = missing([known, *moved, *last])
     slopes = np.nan_to_num((left[1:] - left[0]) / np.append(steps, [step] * len(starts))[:, None])
     own, further = slopes[: len(members)], slopes[len(members) :]
-    limit = PROMISING * _soft(least(known.unknowns, known.x, left[0], own.T)[1])
+    limit = PROMISING * soft(least(known.unknowns, known.x, left[0], own.T)[1])
     costs = []
     for start, slope in zip(starts, further, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
         straight = np.vstack([own[kept], slope]).T
         _, rest = least(start.unknowns, start.x, left[0], straight)
-        costs.append(_soft(rest))
+        costs.append(soft(rest))
     best = [k for k in np.argsort(costs)[:MOST_FITTED] if costs[k] <= limit]
     return {starts[k].unknowns.members[-1].path: starts[k] for k in best}
-
-
-def _soft(left: Array) -> float:
-    """Return half the sum of soft squares: large ones count by their size."""
-    return float(np.sum(np.sqrt(1.0 + left**2) - 1.0))
 
 
 def _fitted(start: Trial, evidence: Evidence, floor: Array) -> Trial | None:

@@ -1,7 +1,5 @@
 """The pictures of a diagnosis."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -50,10 +48,7 @@ PART = {  # of a curve, by the unit of its points
     "m^3/s": ("flow, l/min", 6e4),
     "m^3/Pa": ("compliance, ml/bar", 1e11),
 }
-
-
 TIMES_NOISE = [sign * 10.0**k for sign in (-1, 1) for k in range(1, 7)] + [0.0]  # ticks of errors
-LEGEND: dict[str, Any] = {"ncols": 4, "fontsize": 8, "loc": "outside upper left"}
 
 
 def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
@@ -84,7 +79,8 @@ def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
         beside.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         _tidy(signal, beside)
     # of the figure: beside the left axes it would push the right ones away
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), **LEGEND)
+    lines, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(lines, names, ncols=4, fontsize=8, loc="outside upper left")
     axes[-1, 0].set_xlabel("time, s")
     axes[-1, 1].set_xlabel("time, s")
     return figure

@@ -53,7 +53,7 @@ AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 
-Missing = Callable[[list[Trial]], Array]
+Missing = Callable[[list[Trial]], Array]  # (m, n), in units of the noise
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class _Candidate:
         self.x, self.at_best = self._best(starts)
         for unit in self._steps():
             self.x, self.at_best = self._best([self.x + s * unit for s in FINER])
-        if _soft(self.at_best) > _soft(left.nothing):
+        if soft(self.at_best) > soft(left.nothing):
             self.x, self.at_best = self._best([self.x, self._smaller(self.x)])
         steps = steps_inside(self.x, left.step_size, high)
         self.slopes = (self._inside(self.x + np.diag(steps)) - self.at_best) / steps[:, None]
@@ -143,7 +143,7 @@ class _Candidate:
         """Return the best of some fields, (k,), inside their bounds, and what is left there."""
         points = np.clip(starts, *self.bounds)
         residuals = self._inside(points)
-        best = int(np.argmin([_soft(row) for row in residuals]))
+        best = int(np.argmin([soft(row) for row in residuals]))
         return points[best], residuals[best]
 
     def _smaller(self, x: Array) -> Array:
@@ -188,14 +188,14 @@ class _Candidate:
     def _screened(self, points: list[Array]) -> Screened:
         """Return the trial at the best of some fields, (k,), with its parameters at their best."""
         best, left = self._best(points)
-        return Screened(self._with_parameters(best), _soft(left))
+        return Screened(self._with_parameters(best), soft(left))
 
     def _different(self, points: list[Array]) -> list[Array]:
         """Return fields, (k,), but those that leave what others before them do.
 
         The direction of a load counts for nothing where all of it is on the piston.
         """
-        costs = np.round([_soft(row) for row in self._inside(np.array(points))], COST_DECIMALS)
+        costs = np.round([soft(row) for row in self._inside(np.array(points))], COST_DECIMALS)
         first = np.unique(costs, return_index=True)[1]
         return [points[k] for k in sorted(first)]
 
@@ -215,7 +215,7 @@ class _Candidate:
         starts = _starts(self.effect, self._further, [], 1.0)
         points += [np.append(known, own) for own in starts]
         ways = [self._start.at(np.clip(point, low, high)) for point in points]
-        costs = [_soft(row) for row in missing(ways)]
+        costs = [soft(row) for row in missing(ways)]
         best = int(np.argmin(costs))
         return Screened(ways[best], costs[best])
 
@@ -249,7 +249,7 @@ class OnBalances:
 
     def __init__(self, known: Trial, sheet: Sheet, evidence: Evidence, floor: Array) -> None:
         self._known, self._sheet = known, sheet
-        self._left = _Left(known, _in_balances(evidence, floor), DIFFERENCE_STEP)
+        self._left = _Left(known, in_balances(evidence, floor), DIFFERENCE_STEP)
         self._begun = _begun(known, sheet, _by_balance(known, evidence), self._left)
 
     def singles(self) -> list[Screened]:
@@ -286,11 +286,7 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     By the free run, for a known trial whose balances are quiet: the step that is best to first
     order promises too much far from there, so it is simulated, and shorter ones too.
     """
-    rest = [settled(known.machine, e, evidence) for e in evidence.experiments]
-
-    def missing(trials: list[Trial]) -> Array:
-        return coarse_errors([t.machine for t in trials], evidence, rest)
-
+    missing = in_free_run(known, evidence)
     left = _Left(known, missing, FREE_RUN_STEP)
     told = evidence.told[FORCE]
     loads = _by_balance(known, evidence) if told else _by_free_run(known, sheet, evidence, left)
@@ -298,9 +294,21 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     return sorted((c.stepped(missing) for c in begun), key=lambda s: s.cost)
 
 
-def _in_balances(evidence: Evidence, floor: Array) -> Missing:
+def in_balances(evidence: Evidence, floor: Array) -> Missing:
+    """Return what trials leave in the balances, in units of a floor, (5,)."""
+
     def missing(trials: list[Trial]) -> Array:
         return evidence.in_noise(evidence.residuals([t.machine for t in trials]), floor)
+
+    return missing
+
+
+def in_free_run(known: Trial, evidence: Evidence) -> Missing:
+    """Return what trials leave in the coarse free run, from where a known one is at rest."""
+    rest = [settled(known.machine, e, evidence) for e in evidence.experiments]
+
+    def missing(trials: list[Trial]) -> Array:
+        return coarse_errors([t.machine for t in trials], evidence, rest)
 
     return missing
 
@@ -358,11 +366,11 @@ def _expected(one: _Candidate, other: _Candidate, nothing: Array) -> float:
 
 def _least(residual: Array, slopes: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Return a linear model's best change within bounds, (k,), or none, and its cost."""
-    none, cost = np.zeros(len(slopes)), _soft(residual)
+    none, cost = np.zeros(len(slopes)), soft(residual)
     if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(residual)):
         return none, cost
     change = np.clip(np.linalg.lstsq(slopes.T, -residual, rcond=1e-9)[0], low, high)
-    changed = _soft(residual + change @ slopes)
+    changed = soft(residual + change @ slopes)
     return (change, changed) if changed < cost else (none, cost)
 
 
@@ -395,7 +403,7 @@ def _fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Ar
     return np.array([unknown.at(value) for unknown, value in zip(members, values, strict=True)])
 
 
-def _soft(residual: Array) -> float:
+def soft(residual: Array) -> float:
     """Return half the sum of soft squares, which count large errors by their size."""
     cost = float(np.sum(np.sqrt(1.0 + residual**2) - 1.0))
     return cost if np.isfinite(cost) else float("inf")

@@ -8,7 +8,7 @@ import numpy as np
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.curves import Curve, visited
-from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
@@ -85,8 +85,9 @@ def _remainder(findings: Findings) -> str:
     if speaking is None or shape is None or lies is None:
         return ""
     stage = "refitted" if findings.verdict == "unexplained" else "after"
-    size = level(findings.residuals[stage])[list(BALANCES).index(speaking)]
-    noise_share = size / findings.floor[list(BALANCES).index(speaking)]
+    column = list(BALANCES).index(speaking)
+    size = level(findings.residuals[stage])[column]
+    noise_share = size / findings.floor[column]
     keeps = (
         f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
         f" ({noise_share:.1f} times its noise)"
@@ -322,10 +323,11 @@ def _rejected(rejected: Trial, findings: Findings) -> str:
         math.sqrt(mean_square(trial, findings.evidence)) for trial in (rejected, findings.refitted)
     )
     off = f"{left:.1f} times the noise in the free run, parameters alone {plain:.1f}"
-    if left <= EXPLAINED:  # a balance speaks, then
-        loudness = level(findings.evidence.residuals([rejected.machine])[0]) / findings.floor
-        name = list(BALANCES)[int(np.nanargmax(loudness))]
-        off += f", but {np.nanmax(loudness):.1f} in the balance {name}"
+    residuals = findings.evidence.residuals([rejected.machine])[0]
+    speaking = loudest(residuals, findings.floor, findings.limit)
+    if left <= EXPLAINED and speaking is not None:
+        loudness = dict(zip(BALANCES, level(residuals) / findings.floor, strict=True))
+        off += f", but {loudness[speaking]:.1f} in the balance {speaking}"
     off = f" ({off})" if math.isfinite(left + plain) else ""
     them = "them" if len(rejected.effects) > 1 else "it"
     return f"{closest(rejected)}{off}; without {them} "

@@ -58,9 +58,8 @@ Method = Callable[[Problem, float], Solution]
 Limit = Callable[[Evidence], float]
 
 
-def _anything(part: Evidence) -> float:
+def _anything(_: Evidence) -> float:
     """Return the most that may be left over a beginning where nothing is given up."""
-    del part
     return math.inf
 
 

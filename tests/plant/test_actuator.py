@@ -13,6 +13,7 @@ from emir_plant.actuator import (
     REGISTRY,
     Actuator,
     ActuatorSheet,
+    is_actuator,
     load_actuator,
     simulate,
     write_actuator,
@@ -222,6 +223,15 @@ def test_dry_friction_holds_a_light_piston_until_the_pressure_exceeds_it() -> No
         machine = with_values(PLAIN, still | {"effects.external_load.force": force})
         way = np.abs(simulate(machine, 0.0 * TIME, 1.0)).max()
         assert (way > 0.0) == moves
+
+
+@pytest.mark.parametrize("head", ["", "machine: excavator\n"])
+def test_an_actuator_s_sheet_that_is_not_called_so_is_told(head: str, tmp_path: Path) -> None:
+    """It would be read as the boom's, and its values be no parameters."""
+    sheet = tmp_path / "sheet.yaml"
+    sheet.write_text(f"{head}valve: {{gain: 1.0, time_constant: 2.0}}\nload: {{frequency: 0.3}}\n")
+    with pytest.raises(ParameterError, match=r"sheet\.yaml: machine = .*'actuator' is meant"):
+        is_actuator(sheet)
 
 
 def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:

@@ -73,7 +73,8 @@ def search(
     plain = tried[frozenset()]
     chosen, rivals = _choice(ordered)
     if chosen.rms <= AT_NOISE * noise:
-        rivals += [f for f in ordered if f not in rivals and _does_as_well(f, chosen)]
+        known = {_key(f) for f in rivals}
+        rivals += [f for f in ordered if _key(f) not in known and _does_as_well(f, chosen)]
     if plain.rms <= AT_NOISE * noise and _better(chosen, plain) < STRONG:
         chosen, rivals = plain, []
     chosen = _with_sizes_that_tell(sheet, record, noise, chosen)

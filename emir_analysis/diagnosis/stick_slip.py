@@ -8,7 +8,7 @@ so the fullest law is fitted, and what is not needed is left out.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -50,6 +50,7 @@ DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 OFF = 1.5  # times the noise over that, from which on more is missing: right laws leave 0.98 at most
+CLEARLY = 1.02  # times: what a law has to leave less than one that is not at the noise
 WORSE = 1.1  # times what a rival leaves over a beginning: none that leaves more can replace it
 STICKING_STEP = 3e-3  # as fit.DIFFERENCE_STEP: over longer ones the piston sticks at other instants
 ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest is gone is asked
@@ -73,39 +74,67 @@ def begun(start: Trial, evidence: Evidence, floor: Array, most: float = OFF) -> 
     and with friction that comes along the way. None where more than `most` is left: that is no
     matter of how friction begins. floor: (5,) what the sensors leave in each balance.
     """
-    best = start, _begun(start, evidence, floor)
-    for law in other_laws(start):
-        left = best[1].misfit
-        if left > LEFT and not (left > OFF and is_gradual(law)):
-            best = min(best, (law, _begun(law, evidence, floor)), key=lambda b: b[1].misfit)
-    law, found = best
+    first = _begun(start, evidence, floor)
+    law, found = start, first.fitted
+    for other in other_laws(start):
+        if found.misfit > LEFT and not (found.misfit > OFF and is_gradual(other)):
+            fitted = _begun(other, evidence, floor, first.left).fitted
+            law, found = min((law, found), (other, fitted), key=lambda each: each[1].misfit)
     return law.continued(found) if found.misfit <= most else None
 
 
-def _begun(start: Trial, evidence: Evidence, floor: Array) -> Solution:
-    """Return the fit of one law to the free run of a beginning that grows to DECIDED."""
+class Begun(NamedTuple):
+    """A law fitted to a beginning, and what it left over each shorter one before.
+
+    A law that was given up leaves an infinite misfit.
+    """
+
+    fitted: Solution
+    left: list[float]
+
+
+def _begun(start: Trial, evidence: Evidence, floor: Array, rival: Sequence[float] = ()) -> Begun:
+    """Return the fit of one law to the free run of a beginning that grows to DECIDED.
+
+    It is given up over a beginning where it leaves more than OFF, or, of what a rival law leaves
+    over that one, not clearly less.
+    """
+    fits, time = _over_the_first(start, evidence, floor), FIRST
+    left = [fits[0].misfit]
+    for count in LED:
+        if _given_up(left, rival):
+            return Begun(replace(fits[0], misfit=math.inf), left)
+        longer = GROWTH * time
+        points = [_begin(start, evidence, each, time, longer) for each in fits[:count]]
+        part = evidence.until(longer)
+        fits = _distinct([_fitted(start, part, x, ROUGH_ACCURACY) for x in points])
+        time = longer
+        left.append(fits[0].misfit)
+    return Begun(_led(start, evidence, fits[0].x, time, DECIDED, fit), left)
+
+
+def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Solution]:
+    """Return fits of one law to the first beginning, the best first."""
     if evidence.told[FORCE]:
         starts = friction_starts(start, evidence, floor, FIRST)
     else:
         starts = shapes(start, STRIBECK, evidence.until(FIRST))
-    time, first = FIRST, evidence.until(FIRST)
+    first = evidence.until(FIRST)
     points = [_at_rest(each, evidence) for each in starts]
     fits: list[Solution] = []
     together = SMOOTH if is_along_the_way(start) else STARTS
     for k in (0, together):
         fits += [_fitted(start, first, x, ROUGH_ACCURACY) for x in points[k : k + together]]
-        least = min(each.misfit for each in fits)
-        if least > OFF:
-            return _distinct(fits)[0]
-        if least <= 1.0:
+        if not 1.0 < min(each.misfit for each in fits) <= OFF:
             break
-    for count in LED:
-        longer = GROWTH * time
-        best = _distinct(fits)[:count]
-        points = [_begin(start, evidence, each, time, longer) for each in best]
-        fits = [_fitted(start, evidence.until(longer), x, ROUGH_ACCURACY) for x in points]
-        time = longer
-    return _led(start, evidence, _distinct(fits)[0].x, time, DECIDED, fit)
+    return _distinct(fits)
+
+
+def _given_up(left: list[float], rival: Sequence[float]) -> bool:
+    """Tell whether a law is, by what it leaves over beginnings that grow, and a rival."""
+    other = rival[len(left) - 1] if len(left) <= len(rival) else 0.0
+    most = min(OFF, other / CLEARLY) if other > AT_NOISE else OFF
+    return left[-1] > most
 
 
 def _distinct(fits: list[Solution]) -> list[Solution]:

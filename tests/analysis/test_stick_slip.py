@@ -21,7 +21,14 @@ from emir_analysis.diagnosis.fit import Solution
 from emir_analysis.diagnosis.friction_laws import fullest, is_along_the_way, is_gradual, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.select import at_noise
-from emir_analysis.diagnosis.stick_slip import FIRST, STARTS, begun, grown, with_less_friction
+from emir_analysis.diagnosis.stick_slip import (
+    FIRST,
+    STARTS,
+    Begun,
+    begun,
+    grown,
+    with_less_friction,
+)
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
@@ -117,6 +124,11 @@ def test_viscous_friction_that_is_not_heard_takes_no_break_away_with_it() -> Non
     assert least.effects == ("stribeck_friction",)
 
 
+def at(law: Trial, left: float) -> Solution:
+    """Return a fit that ended where the law is, and what it left."""
+    return Solution(law.x, np.eye(law.x.size), left, np.eye(law.x.size))
+
+
 @pytest.mark.parametrize(
     ("by_tanh", "gradually", "share"), [(0.97, 0.9, 0.0), (1.06, 0.93, 1.0), (1.06, 1.07, 0.0)]
 )
@@ -126,10 +138,8 @@ def test_friction_is_begun_gradually_where_tanh_leaves_more_than_the_noise(
     searched, sheet, evidence = search({})
     start = fullest(trial(sheet, ()), sheet)
 
-    def fitted(law: Trial, *_: object) -> Solution:
-        left = gradually if is_gradual(law) else by_tanh
-        size = law.x.size
-        return Solution(law.x, np.eye(size), left, np.eye(size))
+    def fitted(law: Trial, *_: object) -> Begun:
+        return Begun(at(law, gradually if is_gradual(law) else by_tanh), [])
 
     monkeypatch.setattr(stick_slip, "_begun", fitted)
     law = begun(start, evidence, searched.floor)
@@ -142,14 +152,43 @@ def test_what_is_far_off_over_the_beginning_is_no_matter_of_friction(
     searched, sheet, evidence = search({})
     start, tried = fullest(trial(sheet, ()), sheet), []
 
-    def fitted(law: Trial, *_: object) -> Solution:
+    def fitted(law: Trial, *_: object) -> Begun:
         tried.append(law)
-        return Solution(law.x, np.eye(law.x.size), 2.3, np.eye(law.x.size))
+        return Begun(at(law, 2.3), [])
 
     monkeypatch.setattr(stick_slip, "_begun", fitted)
     assert begun(start, evidence, searched.floor) is None
     assert len(tried) == 2  # along the way besides,
     assert not any(is_gradual(law) for law in tried)  # not gradually
+
+
+@pytest.mark.parametrize(("left", "rival"), [(1.6, []), (1.6, [2.0]), (1.28, [1.3])])
+def test_a_law_is_given_up_over_the_first_beginning(
+    monkeypatch: pytest.MonkeyPatch, left: float, rival: list[float]
+) -> None:
+    searched, sheet, evidence = search({})
+    law = fullest(trial(sheet, ()), sheet)
+    monkeypatch.setattr(stick_slip, "_over_the_first", lambda *_: [at(law, left)])
+    monkeypatch.setattr(stick_slip, "_fitted", None)  # nothing is led on
+    found = stick_slip._begun(law, evidence, searched.floor, rival)
+    assert found.left == [left]
+    assert found.fitted.misfit == np.inf
+
+
+@pytest.mark.parametrize("rival", [[], [1.4], [1.02]])
+def test_a_law_is_led_on_where_no_rival_is_nearly_as_good(
+    monkeypatch: pytest.MonkeyPatch, rival: list[float]
+) -> None:
+    """A rival that is at the noise is none: over so short a beginning both may be right."""
+    searched, sheet, evidence = search({})
+    law = fullest(trial(sheet, ()), sheet)
+    monkeypatch.setattr(stick_slip, "_over_the_first", lambda *_: [at(law, 1.05)])
+    monkeypatch.setattr(stick_slip, "_begin", lambda *_: law.x)
+    monkeypatch.setattr(stick_slip, "_fitted", lambda *_: at(law, 1.0))
+    monkeypatch.setattr(stick_slip, "_led", lambda *_: at(law, 0.99))
+    found = stick_slip._begun(law, evidence, searched.floor, rival)
+    assert found.left == [1.05, 1.0, 1.0]
+    assert found.fitted.misfit == 0.99
 
 
 def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,7 @@ from emir_analysis.diagnosis.experiment import (
 )
 from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, coarse_step, free_runs
 from emir_analysis.diagnosis.measured_state import Modelled, follow
+from emir_analysis.diagnosis.noise_colour import coloured, colours
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
@@ -352,16 +353,28 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
             f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound;"
             " check the data sheet, and sign and zero of joint_angle"
         )
-    seen = [sensed(experiment, machine, run, seed) for seed, run in enumerate(ideal)]
+    colour = colours(experiment, machine)
+    seen = [sensed(experiment, machine, run, seed, colour) for seed, run in enumerate(ideal)]
     return np.array([Balances(each, geometry).residuals([machine])[0] for each in seen])
 
 
-def sensed(experiment: Experiment, machine: Machine, ideal: Array, seed: int = 0) -> Experiment:
-    """Return the experiment as the machine's sensors show ideal readings, (n, 5) as SHOWN."""
+def sensed(
+    experiment: Experiment,
+    machine: Machine,
+    ideal: Array,
+    seed: int = 0,
+    colour: Array | None = None,
+) -> Experiment:
+    """Return the experiment as the machine's sensors show ideal readings, (n, 5) as SHOWN.
+
+    colour: (4,) of their noise as `colours` tells it, white when not given.
+    """
     sensors = machine.sensors
     p = Plant(machine).record[0]
     angle = np.array([resolver(a, sensors.resolver_step) for a in ideal[:, ANGLE_COLUMN]])
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
+    if colour is not None:
+        noise = coloured(noise, colour[1:])
     scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
     stroke = ideal[:, STROKE_COLUMN] if sensors.own_stroke else linkage.strokes(angle, p)
     shown = np.column_stack([stroke, ideal[:, 2:] + noise * scale])

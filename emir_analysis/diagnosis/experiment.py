@@ -10,6 +10,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.command_grid import as_given
 from emir_analysis.diagnosis.recording_checks import (
+    LARGEST_GAP,
     Stamps,
     check_before_command,
     check_command,
@@ -21,6 +22,7 @@ from emir_analysis.diagnosis.recording_checks import (
     check_values,
     stamps,
 )
+from emir_analysis.diagnosis.wild_readings import tamed
 from emir_analysis.errors import InputError
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array, Recording, Signal, SignalMap, load
@@ -59,7 +61,7 @@ class Experiment:
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
     the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
     not what the stated linkage makes of the angle. stamps: the least steady of each kind among the
-    sensors.
+    sensors. left_out: a line for each sensor of which wild readings were left out.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Experiment:
     measured: frozenset[str] = frozenset({ANGLE, *OUTPUTS})
     own_stroke: bool = False
     stamps: Stamps = Stamps()
+    left_out: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -181,6 +184,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
     for signal in sensors.values():
         check_sampling(name, signal)
+    tame = {n: tamed(name, signal, machine, LARGEST_GAP) for n, signal in sensors.items()}
+    sensors = {n: signal for n, (signal, _) in tame.items()}
     check_shared(name, list(sensors.values()))
     begin, end = _shared_span(name, list(sensors.values()))
     check_command(name, recording[COMMAND], begin, end, machine)
@@ -210,8 +215,9 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
     own_stroke = {ANGLE, STROKE} <= measured and _has_own_sensor(shown[STROKE], angle, machine)
     least_steady = Stamps(*np.max([stamps(signal) for signal in sensors.values()], axis=0))
+    left_out = tuple(told for _, told in tame.values() if told)
     return Experiment(
-        name, period, commands, angle, outputs, rest, measured, own_stroke, least_steady
+        name, period, commands, angle, outputs, rest, measured, own_stroke, least_steady, left_out
     )
 
 

@@ -18,16 +18,11 @@ USUAL = 0.95  # of all
 FROZEN = 1.0  # s that a sensor with noise shows the same number
 OFTEN = 0.05  # share of readings that repeat the one before, where steps are coarse
 CLIPPED = 0.01  # share of readings that are the sensor's last
-WILD = 0.5  # of nearly the whole range, by which no signal jumps away and back again ...
-WILD_AT_ONCE = 0.25  # ... nor pressure and motion from one reading to one that soon follows
-SOON = 0.02  # s
-BACK = 2.0  # s, within which wild readings end
-NEARLY_ALL = 0.99
 STUCK = 20.0  # s that a sensor shows nothing but its noise ...
 QUIET = 1.3  # ... times what is stated of that
 TRAVEL = 0.1  # of the whole travel, which the boom makes upwards and downwards in that time
 NEGATIVE = -0.05  # of the pump's pressure; an absolute one is above 0, but for a bias
-FAR_OFF = 20.0  # times its noise: the same of a signal that hardly moves
+FAR_OFF = 20.0  # times its noise: no noise of a sensor is as large
 NOISE = {  # of the sensors that have some
     "pressure_lifting": "pressure_noise",
     "pressure_lowering": "pressure_noise",
@@ -103,11 +98,10 @@ def check_command(name: str, command: Signal, begin: float, end: float, machine:
 
 
 def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine: Machine) -> None:
-    """Raise InputError for a sensor that shows wild readings, freezes or comes to its end.
+    """Raise InputError for a sensor that freezes or comes to its end.
 
     angle: (n,) rad at times, (n,) s.
     """
-    _check_wild(name, signal, machine)
     moved = np.interp(signal.time, time, angle)
     _check_stuck(name, signal, moved, machine)
     for end in _ends(signal):
@@ -127,27 +121,6 @@ def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine
                 f" {signal.time[first]:.2f} s while the boom moves; check the sensor and record"
                 " again, or leave it out of the signal map"
             )
-
-
-def _check_wild(name: str, signal: Signal, machine: Machine) -> None:
-    time, value, aside = signal.time, signal.value, np.diff(signal.value)
-    slow = np.median(np.diff(time)) > SOON or signal.name == "tip_deflection_angle"
-    whole = np.ptp(np.quantile(value, [1.0 - NEARLY_ALL, NEARLY_ALL]))
-    size = (WILD if slow else WILD_AT_ONCE) * whole
-    if signal.name in NOISE:
-        size = max(size, FAR_OFF * getattr(machine.sensors, NOISE[signal.name]))
-    jumps = np.flatnonzero(np.abs(aside) > size)
-    turns = aside[jumps[:-1]] * aside[jumps[1:]] < 0.0
-    wild = turns & (time[jumps[1:]] - time[jumps[:-1]] < BACK)
-    if size > 0.0 and np.any(wild):
-        k = int(np.argmax(wild))
-        first, after = jumps[k] + 1, jumps[k + 1] + 1
-        when = "at" if after == first + 1 else f"from {time[first]:.3f} to"
-        raise InputError(
-            f"{name}: {signal.name} shows {value[first]:.4g} {when} {time[after - 1]:.3f} s alone,"
-            f" {value[first - 1]:.4g} before and {value[after]:.4g} after; check the sensor's"
-            " wiring and record again"
-        )
 
 
 def _check_stuck(name: str, signal: Signal, angle: Array, machine: Machine) -> None:

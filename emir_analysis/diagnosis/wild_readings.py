@@ -54,8 +54,8 @@ def tamed(name: str, signal: Signal, machine: Machine, longest_gap: float) -> Ta
         )
     if lost == 0:
         return Tame(signal, "")
-    readings = "reading is" if lost == 1 else f"of {signal.time.size} readings are"
-    return Tame(kept, f"{name}: {lost} wild {readings} left out: {signal.name} {first}")
+    of = f"{lost} of {signal.time.size} readings wild and left out"
+    return Tame(kept, f"{name}: {of}: {signal.name} {first}")
 
 
 def _size(signal: Signal, machine: Machine) -> float:
@@ -84,14 +84,19 @@ def _wild(signal: Signal, size: float) -> NDArray[np.bool_]:
 
 
 def _alone(signal: Signal, noise: float) -> NDArray[np.bool_]:
-    """Tell which single readings, (n,), stick out of quieter ones around, far beyond the noise.
+    """Tell which single readings, (n,), stick out; in fast sampling alone.
 
-    noise: of the sensor, none where 0. In fast sampling alone: in slow one a shock is as short.
+    In slow one a shock is as short. noise: of the sensor; where it has none, no reading does.
     """
-    result = np.zeros(signal.time.size, dtype=np.bool_)
     if noise == 0.0 or np.median(np.diff(signal.time)) > SOON:
-        return result
-    aside = np.diff(signal.value)
+        return np.zeros(signal.time.size, dtype=np.bool_)
+    return stick_out(signal.value, noise)
+
+
+def stick_out(shown: Array, noise: float) -> NDArray[np.bool_]:
+    """Tell which single readings, (n,), stick out of quieter ones around, far beyond the noise."""
+    result = np.zeros(shown.size, dtype=np.bool_)
+    aside = np.diff(shown)
     away, back = aside[AROUND : -AROUND - 1], aside[AROUND + 1 : -AROUND]
     height = np.where(away * back < 0.0, np.minimum(np.abs(away), np.abs(back)), 0.0)
     windows = sliding_window_view(np.abs(aside), 2 * AROUND + 2)

@@ -315,6 +315,24 @@ def test_a_recording_of_no_use_is_told(
     assert reason in told[-1]
 
 
+def test_a_wild_reading_is_left_out_and_told(folder: Path) -> None:
+    opening = recorded.moves(300, 1)
+    oil = recorded.pressure(opening, lambda spool, _: recorded.GAIN * spool)
+    oil += recorded.NOISE * np.random.default_rng(2).standard_normal(oil.size)
+    wild = oil.copy()
+    wild[[150, 222]] += (12.0, -12.0)
+    recorded.write(folder / "right", opening, oil)
+    recorded.write(folder / "wild", opening, wild)
+    signals = read_signal_map(folder / "signals.yaml")
+    right, mended = (open_record(folder / name, signals) for name in ("right", "wild"))
+    assert right.left_out == ""
+    assert "2 of 300 readings wild and left out: oil_pressure shows" in mended.left_out
+    assert "at 150 alone" in mended.left_out
+    apart = np.abs(mended.pressure - right.pressure)
+    assert np.flatnonzero(apart).tolist() == [150, 222]
+    assert np.max(apart) < 0.5
+
+
 def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> None:
     """On the estimation half alone: the validation half is no business of a test."""
     (tmp_path / "signals.yaml").write_text(

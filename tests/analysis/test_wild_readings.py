@@ -51,7 +51,7 @@ def test_a_few_are_left_out_and_nothing_else(wild: dict[int, float]) -> None:
 def test_it_is_told_which_and_how_many() -> None:
     _, told = tamed("run", pressure({700: 0.0, 900: 0.0}), MACHINE, GAP)
     assert told.startswith(
-        "run: 2 wild of 3000 readings are left out: pressure_lifting shows 0 at 7.0"
+        "run: 2 of 3000 readings wild and left out: pressure_lifting shows 0 at 7.0"
     )
 
 

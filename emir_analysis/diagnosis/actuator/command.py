@@ -55,6 +55,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     signal_map = read_signal_map(signals)
     progress(f"reading {bag}")
     record = open_record(bag, signal_map)
+    _tell(record.left_out, progress)
     found = _found(sheet, record, progress)
     machines = stages(sheet, found)
     # frozen before the judge is opened
@@ -95,9 +96,16 @@ def _judge(
         return None, []
     progress(f"judging on {path}")
     try:
-        return open_judge(path, signal_map, record), []
+        opened = open_judge(path, signal_map, record)
     except InputError as error:
         return None, [InputError(f"{error}; what was found is judged on the same recording")]
+    _tell(opened.left_out, progress)
+    return opened, []
+
+
+def _tell(line: str, progress: Progress) -> None:
+    if line:
+        progress(line)
 
 
 def _write_runs(folder: Path, shown: ActuatorRecord, runs: dict[str, Array]) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from emir_analysis.diagnosis.wild_readings import MOST, stick_out
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Signal, SignalMap, load
 
@@ -23,7 +24,8 @@ SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which 
 class ActuatorRecord:
     """One recording. opening, pressure: (n,). period: between samples, in the stamps' unit.
 
-    begin: stamp of the first sample. unit: of the pressure.
+    begin: stamp of the first sample. unit: of the pressure. left_out: a line where single wild
+    readings of the pressure were left out.
     """
 
     name: str
@@ -32,6 +34,7 @@ class ActuatorRecord:
     opening: Array
     pressure: Array
     unit: str
+    left_out: str = ""
 
     @property
     def time(self) -> Array:
@@ -98,7 +101,22 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
     )
     _check_scale(path, OPENING, float(np.abs(record.opening).max()))
     _check_scale(path, PRESSURE, float(np.std(record.pressure)))
-    return record
+    return _tamed(record)
+
+
+def _tamed(record: ActuatorRecord) -> ActuatorRecord:
+    """Return a recording with a few pressures that stick out made up from those beside them."""
+    wild = stick_out(record.pressure, noise_of(record.pressure))
+    if not 0 < np.count_nonzero(wild) <= MOST * wild.size:
+        return record
+    first = int(np.argmax(wild))
+    told = (
+        f"{record.name}: {np.count_nonzero(wild)} of {wild.size} readings wild and left out:"
+        f" {PRESSURE} shows {record.pressure[first]:.4g} at {record.time[first]:.6g} alone,"
+        f" {record.pressure[first - 1]:.4g} before and {record.pressure[first + 1]:.4g} after"
+    )
+    pressure = np.interp(record.time, record.time[~wild], record.pressure[~wild])
+    return replace(record, pressure=pressure, left_out=told)
 
 
 def open_judge(path: Path, signal_map: SignalMap, record: ActuatorRecord) -> ActuatorRecord:

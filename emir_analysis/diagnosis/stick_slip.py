@@ -34,6 +34,9 @@ from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 STARTS = 12  # from which the first beginning is fitted, and as many again where none comes to noise
+NEARLY = (
+    1.01  # times what the best minimum leaves: half of the fits there, and others would be, too
+)
 SMOOTH = 3  # the same where friction comes along the way: they lead to one minimum
 LED = (6, 3)  # of the best, along the next beginnings
 SAME_MINIMUM = 1.001  # ratio of the errors of two fits up to which they are the same minimum
@@ -114,7 +117,11 @@ def _begun(start: Trial, evidence: Evidence, floor: Array, rival: Sequence[float
 
 
 def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Solution]:
-    """Return fits of one law to the first beginning, the best first."""
+    """Return fits of one law to the first beginning, the best first.
+
+    From as many starts again where none comes to the noise, unless half of them end in the same
+    minimum.
+    """
     if evidence.told[FORCE]:
         starts = friction_starts(start, evidence, floor, FIRST)
     else:
@@ -125,7 +132,10 @@ def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Solu
     together = SMOOTH if is_along_the_way(start) else STARTS
     for k in (0, together):
         fits += [_fitted(start, first, x, ROUGH_ACCURACY) for x in points[k : k + together]]
-        if not 1.0 < min(each.misfit for each in fits) <= OFF:
+        left = np.array([each.misfit for each in fits])
+        least = np.min(left)
+        half_there = np.median(left) <= NEARLY * least
+        if least <= 1.0 or least > OFF or half_there:
             break
     return _distinct(fits)
 

@@ -16,6 +16,7 @@ LONGEST_HELD = 0.5  # s without a command that is published regularly, valve ope
 MUCH_LONGER = 10.0  # ... and times the usual gap, that of ...
 USUAL = 0.95  # of all
 FROZEN = 1.0  # s that a sensor with noise shows the same number
+DEAD = 10.0  # s that it shows its last one while the boom moves upwards and downwards
 OFTEN = 0.05  # share of readings that repeat the one before, where steps are coarse
 CLIPPED = 0.01  # share of readings that are the sensor's last
 STUCK = 20.0  # s that a sensor shows nothing but its noise ...
@@ -126,24 +127,29 @@ def check_readings(name: str, signal: Signal, time: Array, angle: Array, machine
 def _check_stuck(name: str, signal: Signal, angle: Array, machine: Machine) -> None:
     """Raise InputError where a sensor shows nothing but its noise while the boom moves both ways.
 
-    In a steady move a pressure may show no more, and over an empty chamber. angle: (n,) rad when
-    the signal was measured.
+    In a steady move a pressure may show no more, and over a chamber that is empty for some time.
+    angle: (n,) rad when the signal was measured.
     """
     noise = getattr(machine.sensors, NOISE[signal.name]) if signal.name in NOISE else 0.0
+    varied = np.std(signal.value) >= QUIET * noise
     count = int(STUCK / np.median(np.diff(signal.time)))
     for first in range(0, signal.value.size - count + 1, max(1, count // 10)):
         part = signal.value[first : first + count]
-        moved = angle[first : first + count]
-        up = np.max(moved - np.minimum.accumulate(moved))
-        down = np.max(np.maximum.accumulate(moved) - moved)
-        far = min(up, down) > TRAVEL * np.ptp(angle)
-        empty = part.mean() < signal.value.min() + FAR_OFF * noise
+        far = _both_ways(angle[first : first + count]) > TRAVEL * np.ptp(angle)
+        empty = varied and part.mean() < signal.value.min() + FAR_OFF * noise
         if far and not empty and np.std(part) < QUIET * noise:
             raise InputError(
                 f"{name}: {signal.name} shows nothing but its noise about {part.mean():.4g} from"
                 f" {signal.time[first]:.1f} s on while the boom moves; check the sensor and record"
                 " again, or leave it out of the signal map"
             )
+
+
+def _both_ways(angle: Array) -> float:
+    """Return how far a boom moves upwards and downwards, rad: the lesser of the two."""
+    up = np.max(angle - np.minimum.accumulate(angle))
+    down = np.max(np.maximum.accumulate(angle) - angle)
+    return float(min(up, down))
 
 
 def _ends(signal: Signal) -> tuple[float, ...]:
@@ -177,18 +183,21 @@ def _is_frozen(  # noqa: PLR0913, PLR0917 (of one stretch of a recording)
 ) -> bool:
     """Tell whether a signal that shows one number from first to last ought to have moved.
 
-    Noise moves each reading of a sensor but at its end, as over an empty chamber, or where its
-    steps are coarser than the noise: then others repeat, too. A resolver shows one step for as
-    long as the boom rests, but does not jump then.
+    Noise moves each reading of a sensor but at its end, as over a chamber that is empty for some
+    time, or where its steps are coarser than the noise: then others repeat, too. A resolver shows
+    one step for as long as the boom rests, but does not jump then.
     """
     value = signal.value
     if signal.name not in NOISE:
         after = value[min(last + 1, value.size - 1)]
         return bool(abs(after - value[first]) > AT_REST * np.ptp(value))
     others = np.delete(np.diff(value), slice(first, last))
-    if value[first] in {value.min(), value.max()} or np.mean(others == 0.0) > OFTEN:
+    if others.size == 0 or np.mean(others == 0.0) > OFTEN:
         return False
     during = angle[(time >= signal.time[first]) & (time <= signal.time[last])]
+    if value[first] in {value.min(), value.max()}:
+        for_long = signal.time[last] - signal.time[first] > DEAD
+        return bool(for_long and _both_ways(during) > TRAVEL * np.ptp(angle))
     return bool(during.size and np.ptp(during) > LEAST_MOTION * machine.sensors.resolver_step)
 
 

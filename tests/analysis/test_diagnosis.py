@@ -316,6 +316,20 @@ def _drop_out(topics: Topics) -> None:
     topics["pressure_lifting"] = (time, np.where(lost, -999.0, value))
 
 
+def _died(topics: Topics) -> None:
+    time, value = topics["pressure_lowering"]
+    topics["pressure_lowering"] = (time, np.where(time > 3.0, 0.0, value))
+
+
+def _not_connected(topics: Topics) -> None:
+    time, value = np.arange(2500) * 0.01, topics["pressure_lowering"][1]
+    for name in ("joint_states", "cylinder", "boom_deflection", "pressure_lifting"):
+        topics[name] = (time, np.interp(time, *topics[name], period=4.0 * np.pi))
+    noise = np.random.default_rng(1).standard_normal(time.size)
+    topics["pressure_lowering"] = (time, value[0] + 0.2e5 * noise)
+    topics["valve_command"] = (time, 0.4 * (time > 1.0))
+
+
 def _sign_turned(topics: Topics) -> None:
     time, value = topics["pressure_lifting"]
     topics["pressure_lifting"] = (time, -value)
@@ -380,6 +394,8 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_stuck_resolver, "joint_angle stays at .* for 3.0 s from 4.0"),
         (_loose_contact, "pressure_lifting shows 0 at 0.600 s alone"),
         (_drop_out, "pressure_lifting shows -999 from 7.000 to 7.490 s alone"),
+        (_died, "pressure_lowering stays at 0 for 12.0 s from 3.01 s while the boom moves"),
+        (_not_connected, "pressure_lowering shows nothing but its noise about 7.85.e.06"),
         (_sign_turned, "pressure_lifting is negative, .* is its sign turned round"),
         (_gap, "gap of 1.0"),
         (_short, "record at least 10 s"),

@@ -11,6 +11,10 @@ from pathlib import Path
 
 import pytest
 
+# Each of pytest-xdist's processes has one core: more threads there wait for each other.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+
 DOMAINS = range(1, 102)  # 0 is everybody's; above 101 the ports meet Linux's ephemeral ones
 _turn = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
 

@@ -20,7 +20,7 @@ FOREIGN, THIRD, STATED = [
 def test_edges_that_close_along_the_stroke_have_no_name_but_a_curve(tmp_path: Path) -> None:
     """A cushion at the upper end, which the second model makes and no effect of the registry."""
     plan = Plan(seed=502, duration=30.0, foreign=FOREIGN, only=("end_cushion",))
-    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    outcome = trial(plan, KINDS.index("foreign"), threads=1, keep=tmp_path)
     assert outcome.hidden == ["end_cushion"]
     assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
     assert max(outcome.errors["refitted"].values()) > 10.0
@@ -50,7 +50,7 @@ def test_a_load_is_found_that_nobody_told_of(
 
 def test_a_pump_that_hunts_has_no_name_but_a_period(tmp_path: Path) -> None:
     plan = Plan(seed=601, duration=30.0, foreign=THIRD, only=("hunting_pump",))
-    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    outcome = trial(plan, KINDS.index("foreign"), threads=1, keep=tmp_path)
     assert outcome.hidden == ["hunting_pump"]
     assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
     (answer,) = tmp_path.glob("*/answer.json")
@@ -65,7 +65,7 @@ def test_a_pump_that_hunts_has_no_name_but_a_period(tmp_path: Path) -> None:
 def test_a_value_that_the_data_sheet_states_wrongly_is_told(tmp_path: Path) -> None:
     """Other return edges of the spool, in the second model."""
     plan = Plan(seed=61, duration=25.0, foreign=STATED, only=("other_throttle",))
-    outcome = trial(plan, KINDS.index("foreign"), threads=2, keep=tmp_path)
+    outcome = trial(plan, KINDS.index("foreign"), threads=1, keep=tmp_path)
     assert outcome.hidden == ["other_throttle"]
     assert (outcome.verdict, outcome.named) == ("unexplained", []), outcome.failure
     assert max(outcome.errors["refitted"].values()) > 5.0

@@ -34,9 +34,7 @@ from emir_plant.sheet import Sheet
 
 FIRST = 3.0  # s, of the first beginning
 STARTS = 12  # from which the first beginning is fitted, and as many again where none comes to noise
-NEARLY = (
-    1.01  # times what the best minimum leaves: half of the fits there, and others would be, too
-)
+NEARLY = 1.01  # times what the best fit leaves: with half of them there, others end there, too
 SMOOTH = 3  # the same where friction comes along the way: they lead to one minimum
 LED = (6, 3)  # of the best, along the next beginnings
 SAME_MINIMUM = 1.001  # ratio of the errors of two fits up to which they are the same minimum

@@ -10,7 +10,6 @@ import numpy as np
 
 from emir_analysis.diagnosis.command_grid import as_given
 from emir_analysis.diagnosis.recording_checks import (
-    LARGEST_GAP,
     Stamps,
     check_before_command,
     check_command,
@@ -184,7 +183,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
     for signal in sensors.values():
         check_sampling(name, signal)
-    tame = {n: tamed(name, signal, machine, LARGEST_GAP) for n, signal in sensors.items()}
+    tame = {n: tamed(name, signal, machine) for n, signal in sensors.items()}
     sensors = {n: signal for n, (signal, _) in tame.items()}
     check_shared(name, list(sensors.values()))
     begin, end = _shared_span(name, list(sensors.values()))

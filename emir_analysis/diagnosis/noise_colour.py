@@ -33,7 +33,7 @@ def colours(experiment: Experiment, machine: Machine) -> Array:
 
 def _colour(shown: Array, stated: float) -> float:
     count = shown.size
-    if count < FEWEST or np.unique(shown).size < DISTINCT * count:
+    if stated == 0.0 or count < FEWEST or np.unique(shown).size < DISTINCT * count:
         return 0.0
     left = detrend(shown)
     variance = float(np.mean(np.square(left)))

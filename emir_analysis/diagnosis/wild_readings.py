@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from emir_analysis.diagnosis.recording_checks import FAR_OFF, NOISE
+from emir_analysis.diagnosis.recording_checks import FAR_OFF, LARGEST_GAP, NOISE
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Signal
 from emir_plant.parameters import Machine
@@ -30,11 +30,11 @@ class Tame(NamedTuple):
     told: str
 
 
-def tamed(name: str, signal: Signal, machine: Machine, longest_gap: float) -> Tame:
+def tamed(name: str, signal: Signal, machine: Machine) -> Tame:
     """Return a signal without its wild readings.
 
-    name: of the recording. longest_gap: s that their lack may leave. Raises InputError where they
-    last for longer or are more than MOST.
+    name: of the recording. Raises InputError where their lack leaves a gap that is too long, or
+    they are more than MOST.
     """
     size = _size(signal, machine)
     noise = getattr(machine.sensors, NOISE[signal.name]) if signal.name in NOISE else 0.0
@@ -43,19 +43,18 @@ def tamed(name: str, signal: Signal, machine: Machine, longest_gap: float) -> Ta
         return _wild(shown, size) | _alone(shown, noise)
 
     kept, wild = signal, found(signal)
-    first = _described(signal, wild) if np.any(wild) else ""
+    if not np.any(wild):
+        return Tame(signal, "")
+    first = _described(signal, wild)
     while np.any(wild):
         kept = replace(kept, time=kept.time[~wild], value=kept.value[~wild])
         wild = found(kept)
     lost = signal.time.size - kept.time.size
-    if lost > MOST * signal.time.size or _leaves_gap(signal, kept, longest_gap):
+    if lost > MOST * signal.time.size or _leaves_gap(signal, kept):
         raise InputError(
             f"{name}: {signal.name} {first}; check the sensor's wiring and record again"
         )
-    if lost == 0:
-        return Tame(signal, "")
-    of = f"{lost} of {signal.time.size} readings wild and left out"
-    return Tame(kept, f"{name}: {of}: {signal.name} {first}")
+    return Tame(kept, told_of(name, signal.name, lost, signal.time.size, first))
 
 
 def _size(signal: Signal, machine: Machine) -> float:
@@ -108,17 +107,25 @@ def stick_out(shown: Array, noise: float) -> NDArray[np.bool_]:
 
 def _described(signal: Signal, wild: NDArray[np.bool_]) -> str:
     """Return where the first of the wild readings stand, and what is beside them."""
-    time, value = signal.time, signal.value
+    time = signal.time
     first = int(np.argmax(wild))
     after = first + int(np.argmin(wild[first:]))
     when = "at" if after == first + 1 else f"from {time[first]:.3f} to"
-    return (
-        f"shows {value[first]:.4g} {when} {time[after - 1]:.3f} s alone,"
-        f" {value[first - 1]:.4g} before and {value[after]:.4g} after"
-    )
+    return described(signal.value, first, after, f"{when} {time[after - 1]:.3f} s")
 
 
-def _leaves_gap(signal: Signal, kept: Signal, longest: float) -> bool:
+def described(shown: Array, first: int, after: int, when: str) -> str:
+    """Return what the readings, (n,), from first to before after show, and those beside them."""
+    before = f"{shown[first - 1]:.4g} before and {shown[after]:.4g} after"
+    return f"shows {shown[first]:.4g} {when} alone, {before}"
+
+
+def told_of(name: str, signal: str, lost: int, count: int, first: str) -> str:
+    """Return the line that tells of wild readings that were left out, the first as described."""
+    return f"{name}: {lost} of {count} readings wild and left out: {signal} {first}"
+
+
+def _leaves_gap(signal: Signal, kept: Signal) -> bool:
     """Tell whether a gap is longer than any that was there, and too long."""
     gaps: Array = np.diff(kept.time)
-    return bool(np.max(gaps) > max(longest, float(np.max(np.diff(signal.time)))))
+    return bool(np.max(gaps) > max(LARGEST_GAP, float(np.max(np.diff(signal.time)))))

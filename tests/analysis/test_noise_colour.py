@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.noise_colour import coloured, colours
+from emir_common.parameter_tree import with_values
 from emir_plant.sheet import joint1
 
 MACHINE = joint1()
@@ -59,6 +60,13 @@ def test_what_is_no_colour_of_noise_is_not_told_as_one(
     noise: Callable[[int, int], recorded.Array],
 ) -> None:
     assert not np.any(colours(read(noise), MACHINE))
+
+
+def test_a_sensor_without_noise_has_no_colour() -> None:
+    exact = with_values(MACHINE, {"sensors.pressure_noise": 0.0})
+    told = colours(read(lambda n, k: recursive(n, 0.8, seed=k)), exact)
+    assert told[:3].tolist() == [0.0, 0.0, 0.0]
+    assert told[3] > 0.0
 
 
 def test_the_balances_floor_knows_of_it() -> None:

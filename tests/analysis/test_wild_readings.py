@@ -12,7 +12,6 @@ from emir_plant.sheet import joint1
 
 MACHINE = joint1()
 NOISE = MACHINE.sensors.pressure_noise
-GAP = 0.2  # s
 
 
 def pressure(wild: dict[int, float], samples: int = 3000) -> Signal:
@@ -42,14 +41,14 @@ def times_lost(signal: Signal, kept: Signal) -> list[float]:
 )
 def test_a_few_are_left_out_and_nothing_else(wild: dict[int, float]) -> None:
     signal = pressure(wild)
-    kept, told = tamed("run", signal, MACHINE, GAP)
+    kept, told = tamed("run", signal, MACHINE)
     assert times_lost(signal, kept) == pytest.approx([k * 0.01 for k in wild])
     assert bool(told) == bool(wild)
     assert "\n" not in told
 
 
 def test_it_is_told_which_and_how_many() -> None:
-    _, told = tamed("run", pressure({700: 0.0, 900: 0.0}), MACHINE, GAP)
+    _, told = tamed("run", pressure({700: 0.0, 900: 0.0}), MACHINE)
     assert told.startswith(
         "run: 2 of 3000 readings wild and left out: pressure_lifting shows 0 at 7.0"
     )
@@ -60,13 +59,13 @@ def test_it_is_told_which_and_how_many() -> None:
 )
 def test_long_or_many_ones_are_refused(wild: dict[int, float]) -> None:
     with pytest.raises(InputError, match="check the sensor's wiring and record again"):
-        tamed("run", pressure(wild), MACHINE, GAP)
+        tamed("run", pressure(wild), MACHINE)
 
 
 def test_a_step_is_not_wild() -> None:
     signal = pressure({})
     stepped = Signal(signal.name, signal.time, signal.value + 1e7 * (signal.time > 9.0), "Pa")
-    assert tamed("run", stepped, MACHINE, GAP).signal is stepped
+    assert tamed("run", stepped, MACHINE).signal is stepped
 
 
 @pytest.mark.parametrize("period", [0.01, 0.04])
@@ -77,7 +76,7 @@ def test_a_shock_that_swings_on_is_not_wild(period: float) -> None:
     shock = 1e6 * np.exp(-since / 0.15) * np.sin(20.0 * np.pi * since)
     noise = NOISE * np.random.default_rng(2).standard_normal(time.size)
     signal = Signal("pressure_lifting", time, 8e6 + 2e6 * np.sin(time) + shock + noise, "Pa")
-    assert tamed("run", signal, MACHINE, GAP).signal is signal
+    assert tamed("run", signal, MACHINE).signal is signal
 
 
 def as_recorded(run: Experiment, lifting: Array) -> Experiment:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from emir_analysis.diagnosis.wild_readings import MOST, stick_out
+from emir_analysis.diagnosis.wild_readings import MOST, described, stick_out, told_of
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Signal, SignalMap, load
 
@@ -106,16 +106,13 @@ def open_record(path: Path, signal_map: SignalMap) -> ActuatorRecord:
 
 def _tamed(record: ActuatorRecord) -> ActuatorRecord:
     """Return a recording with a few pressures that stick out made up from those beside them."""
-    wild = stick_out(record.pressure, noise_of(record.pressure))
-    if not 0 < np.count_nonzero(wild) <= MOST * wild.size:
+    shown, wild = record.pressure, stick_out(record.pressure, noise_of(record.pressure))
+    lost, first = int(np.count_nonzero(wild)), int(np.argmax(wild))
+    if not 0 < lost <= MOST * wild.size:
         return record
-    first = int(np.argmax(wild))
-    told = (
-        f"{record.name}: {np.count_nonzero(wild)} of {wild.size} readings wild and left out:"
-        f" {PRESSURE} shows {record.pressure[first]:.4g} at {record.time[first]:.6g} alone,"
-        f" {record.pressure[first - 1]:.4g} before and {record.pressure[first + 1]:.4g} after"
-    )
-    pressure = np.interp(record.time, record.time[~wild], record.pressure[~wild])
+    alone = described(shown, first, first + 1, f"at {record.time[first]:.6g}")
+    told = told_of(record.name, PRESSURE, lost, wild.size, alone)
+    pressure = np.interp(record.time, record.time[~wild], shown[~wild])
     return replace(record, pressure=pressure, left_out=told)
 
 

@@ -32,20 +32,22 @@ def colours(experiment: Experiment, machine: Machine) -> Array:
 
 
 def _colour(shown: Array, stated: float) -> float:
+    """Return the colour of one sensor's readings at rest, (n,), by its stated deviation."""
     count = shown.size
     if stated == 0.0 or count < FEWEST or np.unique(shown).size < DISTINCT * count:
         return 0.0
     left = detrend(shown)
     variance = float(np.mean(np.square(left)))
     fresh = float(np.mean(np.square(np.diff(left)))) / 2.0
-    seen = 1.0 - fresh / variance
-    if seen < TOLD / np.sqrt(count):
+    least = TOLD / np.sqrt(count)
+    if fresh >= (1.0 - least) * variance:  # where nothing varies, too
         return 0.0
+    seen = 1.0 - fresh / variance
     # the fewer samples are independent, the less well the time at rest tells the variance
     independent = count * (1.0 - seen) / (1.0 + seen)
     most = variance * (1.0 + WITHIN * np.sqrt(2.0 / independent))
     colour = float(1.0 - fresh / min(most, stated**2))
-    return colour if colour > TOLD / np.sqrt(count) else 0.0
+    return colour if colour > least else 0.0
 
 
 def coloured(white: Array, colour: Array) -> Array:

@@ -1,8 +1,8 @@
 """A recording as the diagnosis uses it: all sensors on one time grid, the command held between."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.command_grid import as_given
 from emir_analysis.diagnosis.recording_checks import (
+    ROUNDING,
     Stamps,
     check_before_command,
     check_command,
@@ -21,6 +22,7 @@ from emir_analysis.diagnosis.recording_checks import (
     check_values,
     stamps,
 )
+from emir_analysis.diagnosis.sampling import Sampling, sampling
 from emir_analysis.diagnosis.wild_readings import tamed
 from emir_analysis.errors import InputError
 from emir_analysis.root_mean_square import rms
@@ -43,6 +45,7 @@ OUTPUTS = {  # what a free run is compared with, in this order, and its unit
 SIGNALS = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS
 
 COMMAND_STEP = 1e-3  # s, the grid on which the held command is kept
+SHARES = 2  # digits of the shares of such a step: stamps are rounded to microseconds
 SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and less
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
 REST = 0.2  # s at the start from which the initial pressure is averaged
@@ -60,7 +63,9 @@ class Experiment:
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
     the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
     not what the stated linkage makes of the angle. stamps: the least steady of each kind among the
-    sensors. left_out: a line for each sensor of which wild readings were left out.
+    sensors. left_out: a line for each sensor of which wild readings were left out. sampling: when
+    angle and outputs were read. later: (l,) the commands behind the last sample that a run needs
+    for the readings on both its sides.
     """
 
     name: str
@@ -73,6 +78,8 @@ class Experiment:
     own_stroke: bool = False
     stamps: Stamps = Stamps()
     left_out: tuple[str, ...] = ()
+    sampling: Sampling = Sampling()
+    later: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def time(self) -> Array:
@@ -95,9 +102,14 @@ class Experiment:
         """Steps of the command grid between two samples."""
         return round(self.period / COMMAND_STEP)
 
+    @property
+    def every_row(self) -> int:
+        """Steps of the command grid between two rows of a run from which the sensors read."""
+        return self.every // self.sampling.rows_between(self.every, COMMAND_STEP)
+
     def stride(self, longest: float) -> int:
-        """Return the most steps of the command grid, within `longest`, s, that divide a sample."""
-        fitting = (n for n in range(1, self.every + 1) if self.every % n == 0)
+        """Return the most steps of the command grid, within `longest`, s, that divide a row."""
+        fitting = (n for n in range(1, self.every_row + 1) if self.every_row % n == 0)
         return max(n for n in fitting if n == 1 or n * COMMAND_STEP <= longest)
 
     def head(self, share: float) -> "Experiment":
@@ -107,11 +119,15 @@ class Experiment:
     def until(self, time: float) -> "Experiment":
         """Return the recording up to a time, s."""
         samples = min(int(time / self.period + 1e-6) + 1, self.angle.size)
+        further = self.sampling.further((samples - 1) * self.period, self.period)
+        count = (samples - 1) * self.every
+        given = np.concatenate([self.commands, self.later])
         return replace(
             self,
-            commands=self.commands[: (samples - 1) * self.every],
+            commands=given[:count],
             angle=self.angle[:samples],
             outputs=self.outputs[:samples],
+            later=given[count : count + further * self.every],
         )
 
     def showing(self, angle: Array, outputs: Array) -> "Experiment":
@@ -127,6 +143,8 @@ class Experiment:
             commands=commands[: (samples - 1) * self.every],
             angle=np.full(samples, self.angle[: self.rest].mean()),
             outputs=np.tile(self.outputs[: self.rest].mean(axis=0), (samples, 1)),
+            sampling=Sampling(),
+            later=np.zeros(0),
         )
 
     def start(self) -> tuple[float, float]:
@@ -196,7 +214,10 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
     period_stated = machine.sensors.command_period
     command = as_given(name, recording[COMMAND], list(sensors.values()), period_stated)
-    commands = _held(command, begin, every * (time.size - 1))
+    read = _sampling(sensors, time, begin)
+    count = every * (time.size - 1)
+    given = _held(command, begin, count + every * read.further(time[-1] - begin, period))
+    commands, later = given[:count], given[count:]
     rest = _rest(name, commands, period, machine)
     measured = frozenset(shown)
     angle = shown[ANGLE] if ANGLE in shown else _angles(shown[STROKE], machine)
@@ -216,8 +237,27 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     least_steady = Stamps(*np.max([stamps(signal) for signal in sensors.values()], axis=0))
     left_out = tuple(told for _, told in tame.values() if told)
     return Experiment(
-        name, period, commands, angle, outputs, rest, measured, own_stroke, least_steady, left_out
+        name,
+        period,
+        commands,
+        angle,
+        outputs,
+        rest,
+        measured,
+        own_stroke,
+        least_steady,
+        left_out,
+        read,
+        later,
     )
+
+
+def _sampling(sensors: Mapping[str, Signal], time: Array, begin: float) -> Sampling:
+    """Return when angle and outputs were read; what has no sensor counts as on the grid."""
+    computed = {ANGLE: STROKE, STROKE: ANGLE}  # from the other, where it has no sensor
+    shown_by = [n if n in sensors else computed.get(n) for n in (ANGLE, *OUTPUTS)]
+    read_at = [time if n is None else sensors[n].time for n in shown_by]
+    return sampling([times - begin for times in read_at], time - begin)
 
 
 def _shared_span(name: str, signals: Sequence[Signal]) -> tuple[np.float64, np.float64]:
@@ -270,10 +310,18 @@ def noise(machine: Machine) -> Array:
 
 
 def _held(command: Signal, begin: float, count: int) -> Array:
-    """Return the command on its grid, each message held until the next; 0 before the first."""
-    time = begin + np.arange(count) * COMMAND_STEP
-    latest = np.searchsorted(command.time, time + 1e-6, side="right") - 1
+    """Return the command on its grid, each message held until the next; 0 before the first.
+
+    In a step within which a message comes the mean, so that none acts earlier or later.
+    """
+    edges = begin + np.arange(count + 1) * COMMAND_STEP
+    latest = np.searchsorted(command.time, edges[:-1] + ROUNDING, side="right") - 1
     held = np.where(latest < 0, 0.0, command.value[np.maximum(latest, 0)])
+    step = np.searchsorted(edges, command.time - ROUNDING) - 1
+    within = (step >= 0) & (step < count)
+    left = 1.0 - (command.time - edges[step]) / COMMAND_STEP
+    change = np.round(left, SHARES) * np.diff(command.value, prepend=0.0)
+    np.add.at(held, step[within], change[within])
     return np.asarray(np.clip(held, -1.0, 1.0))
 
 

@@ -39,18 +39,21 @@ def free_runs(
     if not able:
         return result
     stride = experiment.stride(coarse_step(plants)) if coarse else 1
-    commands = np.ascontiguousarray(experiment.commands[::stride])  # or more is compiled
+    given = np.concatenate([experiment.commands, experiment.later])
+    commands = np.ascontiguousarray(given[::stride])  # or more is compiled
+    row = experiment.every_row * COMMAND_STEP
     truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
         commands,
         COMMAND_STEP * stride,
-        experiment.every // stride,
+        experiment.every_row // stride,
         np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
         min(COMMAND_STEP * stride, stable_step(plants)),
     )
     for k, truth in zip(able, truths, strict=True):
-        shown = readings(plants[k], truth, experiment.period)
-        result[k] = np.column_stack([getattr(shown, name) for name in SHOWN])
+        shown = readings(plants[k], truth, row)
+        run = np.column_stack([getattr(shown, name) for name in SHOWN])
+        result[k] = experiment.sampling.read(run, row, experiment.time)
     return result
 
 

@@ -421,7 +421,8 @@ def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arr
     points = np.zeros((1, 2))
     if not starts.is_told:
         points = np.column_stack([np.zeros(RESTS), np.linspace(-1.0, 1.0, RESTS)])
-    cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
+    with np.errstate(over="ignore"):  # of a run out of all bounds
+        cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
     best: Array = points[int(np.argmin(cost))]
     if not np.isfinite(np.min(cost)):
         return best

@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.misstated import misstated
+from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
@@ -89,6 +90,8 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     curves, with_curve = Curves(search.balanced, evidence, search.floor), None
     if verdict == "found" and not at_noise(final, evidence):
         verdict, with_curve = _doubted(final, curves, progress)
+        if verdict == "found" and _drifts(final, search, evidence):
+            verdict = "unexplained"
     rejected = None
     if verdict == "nothing_missing":
         refitted = final = search.whole.fitted(final)
@@ -154,6 +157,14 @@ def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Tri
     progress("asking whether a curve says it better")
     instead = curves.measured_instead(named)
     return "found" if instead is None else "unexplained", instead
+
+
+def _drifts(named: Trial, search: Search, evidence: Evidence) -> bool:
+    """Tell whether a load that does not bring the free run to the noise may be a size that drifts.
+
+    In the balances one that comes slowly is the same as a gauge that drifts.
+    """
+    return LOAD in named.effects and drift(search.balanced, evidence, search.floor) is not None
 
 
 def _measured(

@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.result import (
 from emir_analysis.diagnosis.select import EXPLAINED
 
 ROUNDING = 1e-6  # relative
+DELAY = "command_delay"
 LOUD = (
     ". Look for the cause in the parts of the machine whose balances speak below, at the values and"
     " times that the pictures of them show."
@@ -67,6 +68,11 @@ def cautions(result: Diagnosis) -> list[str]:
         lines.append(
             f"at the end of what is allowed: {', '.join(result.at_end)}; a machine may be there,"
             " but where this one cannot, something else is missing"
+        )
+    if any(effect.name == DELAY for effect in result.effects):
+        lines.append(
+            f"{DELAY}: in a recording the same as sensors that are all stamped late by as much; see"
+            " that one clock stamps command and sensors"
         )
     return lines + list(result.untold.values())
 

@@ -90,7 +90,7 @@ class Curves:
         if best is None or best.share < MEASURED_SHARE:
             return None
         found = _fitted(best.trial, self._evidence)
-        if excess(found, self._evidence) > beyond(EXPLAINED):
+        if not excess(found, self._evidence) <= beyond(EXPLAINED):  # NaN of a run out of bounds
             return None
         left = level(self._evidence.residuals([found.machine])[0])
         return found if quiet(left, limits(found.machine, self._evidence)) else None

@@ -54,6 +54,7 @@ def test_a_valve_whose_null_moves_is_told() -> None:
         {"effects.sensor_bias.pressure_lifting": 3e5},
         {"effects.internal_leakage.coefficient": 5e-12},
         {"geometry.modal_damping": 0.06},
+        {"effects.external_load.mean": 300.0, "effects.external_load.start": 12.0},
     ],
     ids=str,
 )

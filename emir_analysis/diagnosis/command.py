@@ -130,7 +130,7 @@ def _opened(
     known = graph_signals(path) if signal_map is None else signal_map
     opened = open_experiment(path, known, machine)
     check_wiring(opened, machine)
-    for line in opened.left_out:
+    for line in opened.mended:
         progress(line)
     for file in files(path):
         if not is_finished(file):

@@ -23,6 +23,7 @@ from emir_analysis.diagnosis.recording_checks import (
     stamps,
 )
 from emir_analysis.diagnosis.sampling import Sampling, sampling
+from emir_analysis.diagnosis.steady_stamps import steadied, steadied_told
 from emir_analysis.diagnosis.wild_readings import tamed
 from emir_analysis.errors import InputError
 from emir_analysis.root_mean_square import rms
@@ -63,7 +64,7 @@ class Experiment:
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
     the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
     not what the stated linkage makes of the angle. stamps: the least steady of each kind among the
-    sensors. left_out: a line for each sensor of which wild readings were left out. sampling: when
+    sensors. mended: a line for what was mended in them, as wild readings left out. sampling: when
     angle and outputs were read. later: (l,) the commands behind the last sample that a run needs
     for the readings on both its sides.
     """
@@ -77,7 +78,7 @@ class Experiment:
     measured: frozenset[str] = frozenset({ANGLE, *OUTPUTS})
     own_stroke: bool = False
     stamps: Stamps = Stamps()
-    left_out: tuple[str, ...] = ()
+    mended: tuple[str, ...] = ()
     sampling: Sampling = Sampling()
     later: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -203,6 +204,9 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
         check_sampling(name, signal)
     tame = {n: tamed(name, signal, machine) for n, signal in sensors.items()}
     sensors = {n: signal for n, (signal, _) in tame.items()}
+    steady = steadied(sensors)
+    mended = [told for _, told in tame.values() if told] + steadied_told(name, sensors, steady)
+    sensors |= steady
     check_shared(name, list(sensors.values()))
     begin, end = _shared_span(name, list(sensors.values()))
     check_command(name, recording[COMMAND], begin, end, machine)
@@ -235,7 +239,6 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)
     own_stroke = {ANGLE, STROKE} <= measured and _has_own_sensor(shown[STROKE], angle, machine)
     least_steady = Stamps(*np.max([stamps(signal) for signal in sensors.values()], axis=0))
-    left_out = tuple(told for _, told in tame.values() if told)
     return Experiment(
         name,
         period,
@@ -246,7 +249,7 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
         measured,
         own_stroke,
         least_steady,
-        left_out,
+        tuple(mended),
         read,
         later,
     )

@@ -11,7 +11,7 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment, noise
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
-FEWEST = 50  # samples at rest, by which a colour is told
+FEWEST = 25  # samples at rest, by which a colour is told
 TOLD = 3.0  # standard deviations of what white noise has of it
 WITHIN = 2.0  # standard deviations, within which a variance is the stated one
 DISTINCT = 0.5  # share of the samples: fewer values are a coarse sensor's steps, no noise

@@ -94,9 +94,9 @@ def test_the_recording_is_nearly_what_it_would_have_been() -> None:
     places = [400, 800, 1203]
     spoilt = lifting.copy()
     spoilt[places] = [0.0, 3e7, 0.0]
-    right, mended = as_recorded(run, lifting), as_recorded(run, spoilt)
-    assert right.left_out == ()
-    assert len(mended.left_out) == 1
-    apart = np.abs(mended.outputs - right.outputs)
+    right, spared = as_recorded(run, lifting), as_recorded(run, spoilt)
+    assert right.mended == ()
+    assert len(spared.mended) == 1
+    apart = np.abs(spared.outputs - right.outputs)
     assert np.flatnonzero(np.any(apart > 0.0, axis=1)).tolist() == places
     assert np.max(apart[:, 1]) < 6.0 * NOISE

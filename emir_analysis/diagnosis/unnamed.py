@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import BALANCES, FORCE_WINDOW, level
+from emir_analysis.diagnosis.balances import BALANCES, FORCE, FORCE_WINDOW, level
 from emir_analysis.diagnosis.candidates import (
     FREE_RUN_ACCURACY,
     GROWING,
@@ -99,9 +99,12 @@ class Curves:
         """Tell whether friction that differs with the direction says the balances clearly better.
 
         named: with dry friction, and maybe effects beside it, of which a sensor's bias comes near
-        that: such friction is an even one and a constant force that acts in motion alone. Both as
-        the balances have them: the free run of what sticks is rough.
+        that: such friction is an even one and a constant force that acts in motion alone, beside
+        those effects or without them. All as the balances have them: the free run of what sticks is
+        rough. False where these do not tell a force.
         """
+        if not self._evidence.told[FORCE]:
+            return False
         friction = named
         for effect in named.effects:
             if not effect.endswith(FRICTION):
@@ -109,7 +112,8 @@ class Curves:
         fitted = [fit_balances(each, self._evidence, self._floor) for each in (named, friction)]
         as_named, even = (self._about(each) for each in fitted)
         without = min(as_named.as_it_is(), even.as_it_is())
-        return even.with_force_in_motion() < without - STRONG
+        pushed = min(even.with_force_in_motion(), as_named.with_force_in_motion())
+        return pushed < without - STRONG
 
     def measured_instead(self, named: Trial) -> Trial | None:
         """Return the same where a curve says clearly what effects only come near.

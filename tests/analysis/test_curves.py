@@ -155,6 +155,15 @@ def test_friction_that_differs_with_the_direction_is_told_from_a_bias(
     assert curves.uneven(trial(sheet, ("coulomb_friction", second))) == uneven
 
 
+def test_friction_is_not_asked_about_where_no_sensor_tells_a_force() -> None:
+    machine = with_values(joint1(), {"effects.coulomb_friction.force": 9.5e3})
+    evidence = Evidence([without(moved(machine), "pressure_lowering")], joint1())
+    sheet = Sheet(joint1(), {"cylinder.beta": 0.1}, {}, ())
+    floor = evidence.floor(sheet.machine)
+    curves = Curves(fit_balances(trial(sheet, ()), evidence, floor), evidence, floor)
+    assert not curves.uneven(trial(sheet, ("coulomb_friction",)))
+
+
 def curve_of(found: Trial | None) -> Curve:
     """Return the curve that was measured."""
     assert found is not None

@@ -117,15 +117,22 @@ def test_what_a_machine_lacks_is_not_taken_for_a_wrong_wiring(
     assert found.measured == {*TOPICS}
 
 
-def test_stamps_beside_the_measurement_are_told(healthy: Signals, machine: Machine) -> None:
-    """Those of messages that were 0 to 8 ms under way."""
+@pytest.mark.parametrize("steady", [True, False])
+def test_stamps_that_scatter_are_mended_or_told(
+    healthy: Signals, machine: Machine, *, steady: bool
+) -> None:
+    """Those of messages that were 0 to 8 ms under way, and of sensors read at such times."""
     random, late = np.random.default_rng(1), dict(healthy)
     for name in TOPICS:
         signal = healthy[name]
         time = np.sort(signal.time + random.uniform(0.0, 8e-3, signal.time.size))
-        late[name] = replace(signal, time=time)
-    told = of_stamps([opened(healthy, machine), opened(late, machine)])
-    assert "stamps scatter by 2." in told  # of two such delays' difference half is within 2.3 ms
+        value = signal.value if steady else np.interp(time, signal.time, signal.value)
+        late[name] = replace(signal, time=time, value=value)
+    found = opened(late, machine)
+    told = "".join(found.mended) if steady else of_stamps([opened(healthy, machine), found])
+    assert "scatter by 2." in told  # of two such delays' difference half is within 2.3 ms
+    assert bool(found.mended) == steady
+    assert not (steady and of_stamps([found]))
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.0, ""), (0.05, ""), (0.3, "% of a sensor's sam")])

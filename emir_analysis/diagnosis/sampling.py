@@ -54,8 +54,8 @@ class Sampling:
         shown: Array = run[np.rint(time / row).astype(int)]
         for k, times in enumerate(self.read_at):
             if times is not None:
-                within = times[(times >= -row) & (times <= fine[-1] + row)]
-                shown[:, k] = np.interp(time, within, np.interp(within, fine, run[:, k]))
+                lasting = times[times <= fine[-1] + row]  # before its start a run is at rest
+                shown[:, k] = np.interp(time, lasting, np.interp(lasting, fine, run[:, k]))
         return shown
 
     def _off_grid(self) -> list[Array]:

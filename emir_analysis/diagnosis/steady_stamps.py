@@ -36,7 +36,8 @@ def steadied(sensors: Mapping[str, Signal]) -> dict[str, Signal]:
         if time is None:
             return {}
         steady[name] = replace(signal, time=time)
-        smoother += np.log(_roughness(signal) / _roughness(steady[name]))
+        if np.ptp(signal.value) > 0.0:
+            smoother += np.log(_roughness(signal) / _roughness(steady[name]))
     return steady if smoother > SMOOTHER else {}
 
 

@@ -58,10 +58,11 @@ def test_readings_that_were_unsteady_keep_their_stamps(deviation: float) -> None
     assert steadied({"p": Signal("p", time, swinging(time, 1), "Pa")}) == {}
 
 
-def test_what_tells_nothing_keeps_its_stamps() -> None:
-    """Of a sensor that shows noise alone no time is smoother than another."""
+@pytest.mark.parametrize("deviation", [0.0, 1.0])
+def test_what_tells_nothing_keeps_its_stamps(deviation: float) -> None:
+    """Of a sensor that shows noise alone, or stands still, no time is smoother than another."""
     signal, _ = stamped(one_sided(0.004))
-    noise = np.random.default_rng(5).standard_normal(signal.time.size)
+    noise = deviation * np.random.default_rng(5).standard_normal(signal.time.size)
     assert steadied({"p": Signal("p", signal.time, noise, "Pa")}) == {}
 
 

@@ -199,14 +199,7 @@ def check_signal_map(signal_map: SignalMap) -> None:
 
 def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     """Bring a recording's signals on one grid. Raises InputError as `open_experiment`."""
-    sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
-    for signal in sensors.values():
-        check_sampling(name, signal)
-    tame = {n: tamed(name, signal, machine) for n, signal in sensors.items()}
-    sensors = {n: signal for n, (signal, _) in tame.items()}
-    steady = steadied(sensors)
-    mended = [told for _, told in tame.values() if told] + steadied_told(name, sensors, steady)
-    sensors |= steady
+    sensors, mended = _sensors(name, recording, machine)
     check_shared(name, list(sensors.values()))
     begin, end = _shared_span(name, list(sensors.values()))
     check_command(name, recording[COMMAND], begin, end, machine)
@@ -253,6 +246,23 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
         read,
         later,
     )
+
+
+def _sensors(
+    name: str, recording: Recording, machine: Machine
+) -> tuple[dict[str, Signal], list[str]]:
+    """Return what the sensors show, wild readings and late stamps mended, and a line of each.
+
+    Raises InputError for a sensor with a gap or with many wild readings.
+    """
+    sensors = {n: recording[n] for n in (ANGLE, *OUTPUTS) if n in recording.signals}
+    for signal in sensors.values():
+        check_sampling(name, signal)
+    tame = {n: tamed(name, signal, machine) for n, signal in sensors.items()}
+    sensors = {n: signal for n, (signal, _) in tame.items()}
+    steady = steadied(sensors)
+    mended = [told for _, told in tame.values() if told] + steadied_told(name, sensors, steady)
+    return sensors | steady, mended
 
 
 def _sampling(sensors: Mapping[str, Signal], time: Array, begin: float) -> Sampling:

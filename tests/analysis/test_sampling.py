@@ -20,10 +20,13 @@ from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.sampling import Sampling
 from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Recording, Signal
+from emir_plant import linkage
+from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 
 MACHINE = joint1()
-NOISE = [4e-4, 0.2e5, 0.2e5, 2e-5]  # m of the resolver's step, Pa, Pa, rad
+ARM = linkage.lever_arm(np.pi / 4.0, Plant(MACHINE).record[0])  # m
+NOISE = [ARM * recorded.STEP / np.sqrt(12.0), 0.2e5, 0.2e5, 2e-5]  # m, Pa, Pa, rad
 TOPICS = dict(
     zip(
         (ANGLE, *OUTPUTS),

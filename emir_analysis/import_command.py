@@ -224,6 +224,11 @@ def _columns(file: Path) -> dict[str, Column]:
         entry = entries[name]
         if "column" not in entry:
             raise InputError(f"{file}: {name}: needs the column of the table")
+        if source.unit in UNITS:
+            raise InputError(
+                f"{file}: {name}: unit: {source.unit}, but a recording is in SI units; write"
+                f" column_unit: {source.unit}, unit: {UNITS[source.unit][0]}"
+            )
         unit = str(entry.get("column_unit", source.unit))
         si, factor = UNITS.get(unit, (unit, 1.0)) if unit != source.unit else (unit, 1.0)
         if si != source.unit:

@@ -33,8 +33,9 @@ class Judged:
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
     errors (n, 4) of the change from one sample to the next, of each recording, as in `Balances`.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
-    surprising: what was found does not explain them. reconciled: nothing was found missing, and
-    other parameters inside the tolerances explain them and the recordings that were fitted.
+    surprising: what was found does not explain them, or one of their signals. reconciled: nothing
+    was found missing, and other parameters inside the tolerances explain them and the recordings
+    that were fitted.
     """
 
     evidence: Evidence
@@ -73,10 +74,10 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     ahead = black_box.train_one_step(findings.evidence)
     runs[BLACK_BOX] = [_spread(free.free_run(e), evidence) for e in evidence.experiments]
     one_step[BLACK_BOX] = [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
-    surprising, reconciled = not explained(findings.chosen, evidence), False
-    if findings.verdict == "nothing_missing":
-        surprising = surprising or loudest_signal(findings.chosen.machine, evidence)[1] > EXPLAINED
-        reconciled = surprising and _reconciled(findings, evidence)
+    alone = loudest_signal(findings.chosen.machine, evidence)[1]
+    surprising = not explained(findings.chosen, evidence) or alone > EXPLAINED
+    asked = findings.verdict == "nothing_missing" and surprising
+    reconciled = asked and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
 
 

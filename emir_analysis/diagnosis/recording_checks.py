@@ -50,8 +50,14 @@ class Stamps(NamedTuple):
 
 
 def check_sampling(name: str, signal: Signal) -> None:
-    """Raise InputError where a signal has a gap."""
+    """Raise InputError where a signal has a gap, or comes too seldom at all."""
     gaps = np.diff(signal.time)
+    usual = float(np.median(gaps))
+    if usual > LARGEST_GAP + ROUNDING:
+        raise InputError(
+            f"{name}: {signal.name} comes every {usual:.3g} s; record at least"
+            f" {1.0 / LARGEST_GAP:.0f} samples a second, or are its stamps in ms for s?"
+        )
     widest = int(np.argmax(gaps))
     if gaps[widest] > LARGEST_GAP + ROUNDING:
         raise InputError(

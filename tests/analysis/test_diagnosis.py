@@ -341,6 +341,11 @@ def _gap(topics: Topics) -> None:
     topics["pressure_lifting"] = (time[kept], value[kept])
 
 
+def _in_milliseconds(topics: Topics) -> None:
+    for name, (time, value) in topics.items():
+        topics[name] = (1e3 * time, value)
+
+
 def _short(topics: Topics) -> None:
     for name, (time, value) in topics.items():
         topics[name] = (time[:200], value[:200])
@@ -398,6 +403,7 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_not_connected, "pressure_lowering shows nothing but its noise about 7.85.e.06"),
         (_sign_turned, "pressure_lifting is negative, .* is its sign turned round"),
         (_gap, "gap of 1.0"),
+        (_in_milliseconds, "joint_angle comes every 10 s; .* are its stamps in ms for s"),
         (_short, "record at least 10 s"),
         (_in_bar, "is it in bar"),
         (_in_degrees, "is it in deg"),

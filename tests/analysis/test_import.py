@@ -192,6 +192,7 @@ def test_a_table_of_no_use_is_told_in_one_line(
         ("{column: x, topic: /a, field: data, unit: m}", "stroke and other are one column, x"),
         ("{column: w, topic: /a, field: temperature, unit: K}", "no message for temperature"),
         ("{column: x, column_unit: bar, topic: /a, field: data, unit: m}", "no signal in m"),
+        ("{column: w, topic: /a, field: data, unit: bar}", "write column_unit: bar, unit: Pa"),
         ("{column: w, topic: /rig/pressure, field: fluid_pressure, unit: Pa}", "in one field"),
         ("{column: w, topic: /a, field: 'position[100]', unit: m}", "an index is at most 99"),
     ],

@@ -22,8 +22,8 @@ LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
 FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
 OUT_OF_BOUNDS = 1e12  # times the noise: a run that is further off is out of all bounds
 TOLD_CURVATURE = 1.0 + 1e-6  # times the curvature of what holds a parameter: more, and data tell
-KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
-EVALUATIONS = 20  # of the model in one fit, beside those for the slopes
+KEPT = 0.3  # of what slopes promise a step has to take away for them to be corrected, not taken
+EVALUATIONS = 40  # of the model in one fit, beside those for the slopes
 
 
 @dataclass(frozen=True)
@@ -85,34 +85,28 @@ def fit(
     start = np.clip(problem.start, low + margin, high - margin)
     held = _Held(problem, start)
 
-    first: Array = held.residuals(start[None])[0]
-    if not np.all(np.isfinite(first)):
+    course = _Course(held, start, robust=robust)
+    if not np.all(np.isfinite(course.residuals(np.zeros_like(start)))):
         return _impossible(start)
-
-    def residuals(change: Array) -> Array:
-        if not np.any(change):
-            return first
-        return np.asarray(held.residuals((start + change)[None])[0])
-
-    def jacobian(change: Array) -> Array:
-        return held.slopes(start + change)[1]
-
-    # As a change from the start, since the trust region is at first as large as what it is given,
-    # or one for zero: where a fit begins is no measure of how far a first step may lead.
-    result = least_squares(
-        residuals,
-        np.zeros_like(start),
-        jac=jacobian,
-        bounds=(low - start, high - start),
-        loss="soft_l1" if robust else "linear",
-        xtol=LEAST_STEP,
-        ftol=accuracy,
-        max_nfev=evaluations,
-    )
-    slopes = np.asarray(result.jac)
+    change, spent = np.zeros_like(start), 0
+    while True:
+        result = least_squares(
+            course.residuals,
+            change,
+            jac=course.slopes,
+            bounds=(low - start, high - start),
+            loss="soft_l1" if robust else "linear",
+            xtol=LEAST_STEP,
+            ftol=accuracy,
+            max_nfev=evaluations - spent,
+        )
+        change, spent = result.x, spent + result.nfev
+        if spent >= evaluations or course.ends():
+            break
+    slopes = course.known
     return Solution(
-        np.clip(start + result.x, low, high),
-        held.covariance(slopes, result.fun),
+        np.clip(start + change, low, high),
+        held.covariance(slopes, course.residuals(change)),
         math.sqrt(2.0 * result.cost / result.fun.size),
         slopes.T @ slopes,
     )
@@ -286,6 +280,72 @@ class _Held:
         untold = np.flatnonzero(~(_told(slopes) | self._problem.stated))
         covariance[untold, untold] = np.inf
         return np.asarray(covariance, dtype=np.float64)
+
+
+class _Course:
+    """The way of a fit: residuals, and slopes that are corrected from step to step (Broyden 1965).
+
+    Slopes cost as many runs as there are parameters. They are taken anew where a step takes away
+    much less than they promise, and once more where a fit would end by corrected ones. Points are
+    a change from the start, (k,): the trust region is at first as large as what it is given, or one
+    for zero, and where a fit begins is no measure of how far a first step may lead.
+
+    known: (n + k, k), the slopes.
+    """
+
+    def __init__(self, held: _Held, start: Array, *, robust: bool) -> None:
+        self._held, self._start, self._robust = held, start, robust
+        self._last = self._at = (np.full_like(start, np.nan), start)  # points, residuals there
+        self.known = np.empty(0)
+        self._taken = self._sound = False  # known at `_at`, not corrected; and so before the step
+        self._begins = True
+
+    def residuals(self, change: Array) -> Array:
+        """Return the residuals, (n + k,), at a point. A copy: robust fits write into them."""
+        for point, values in (self._last, self._at):
+            if np.array_equal(point, change):
+                return values.copy()
+        values = np.asarray(self._held.residuals((self._start + change)[None])[0])
+        self._last = (change.copy(), values)
+        return values.copy()
+
+    def slopes(self, change: Array) -> Array:
+        """Return the slopes, (n + k, k), at a point to which a step has led, or the first one."""
+        after = self.residuals(change)
+        if self._begins:
+            self._begins, self._sound = False, True
+            self._take(change)
+        else:
+            self._sound = self._taken
+            self._follow(change, after)
+        self._at = (change.copy(), after)
+        return self.known.copy()
+
+    def ends(self) -> bool:
+        """Tell whether a fit that would go no further was led by slopes that were not corrected.
+
+        If not, it is to be begun again, with slopes taken anew.
+        """
+        self._begins = not self._sound
+        return self._sound
+
+    def _follow(self, change: Array, after: Array) -> None:
+        """Correct the slopes by what a step has led to, residuals (n + k,), or take them anew."""
+        before, step = self._at[1], change - self._at[0]
+        foreseen = before + self.known @ step
+        gained = self._cost(before) - self._cost(after)
+        if gained > KEPT * (self._cost(before) - self._cost(foreseen)):
+            self.known, self._taken = _corrected(self.known, step, after - foreseen), False
+        else:
+            self._take(change)
+
+    def _take(self, change: Array) -> None:
+        if not (self._taken and np.array_equal(change, self._at[0])):
+            self.known, self._taken = self._held.slopes(self._start + change)[1], True
+
+    def _cost(self, residuals: Array) -> float:
+        squares = np.square(residuals)
+        return float(np.sum(2.0 * (np.sqrt(1.0 + squares) - 1.0) if self._robust else squares))
 
 
 def _told(slopes: Array) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from emir_analysis.signals import Array
 
@@ -22,8 +22,9 @@ LONGEST = 0.3  # and the most, in units of the tolerance or the trial value
 FAR = 2.0  # times the cost: a step that leads there says nothing about slopes
 OUT_OF_BOUNDS = 1e12  # times the noise: a run that is further off is out of all bounds
 TOLD_CURVATURE = 1.0 + 1e-6  # times the curvature of what holds a parameter: more, and data tell
-KEPT = 0.3  # of what slopes promise a step has to take away for them to be corrected, not taken
-EVALUATIONS = 40  # of the model in one fit, beside those for the slopes
+KEPT = 0.3  # of what slopes promise a step has to take away for them to be kept for the next
+FOLLOWED = 0.6  # the same of those that a trust region is led by: in bent valleys less leads astray
+EVALUATIONS = 60  # of the model in one fit, beside those for the slopes
 
 
 @dataclass(frozen=True)
@@ -84,31 +85,50 @@ def fit(
     margin = 1e-6 * np.minimum(high - low, 1.0)
     start = np.clip(problem.start, low + margin, high - margin)
     held = _Held(problem, start)
-
-    course = _Course(held, start, robust=robust)
-    if not np.all(np.isfinite(course.residuals(np.zeros_like(start)))):
+    course = _Course(held, robust=robust)
+    if not np.all(np.isfinite(course.residuals(start))):
         return _impossible(start)
-    change, spent = np.zeros_like(start), 0
+    x, spent = start, 0
     while True:
-        result = least_squares(
-            course.residuals,
-            change,
-            jac=course.slopes,
-            bounds=(low - start, high - start),
-            loss="soft_l1" if robust else "linear",
-            xtol=LEAST_STEP,
-            ftol=accuracy,
-            max_nfev=evaluations - spent,
-        )
-        change, spent = result.x, spent + result.nfev
+        x = np.clip(x, low + margin, high - margin)
+        result = _trust_region(course, x, (low, high), accuracy, evaluations - spent)
+        x, spent = x + result.x, spent + result.nfev
         if spent >= evaluations or course.ends():
             break
     slopes = course.known
     return Solution(
-        np.clip(start + change, low, high),
-        held.covariance(slopes, course.residuals(change)),
+        np.clip(x, low, high),
+        held.covariance(slopes, course.residuals(x)),
         math.sqrt(2.0 * result.cost / result.fun.size),
         slopes.T @ slopes,
+    )
+
+
+def _trust_region(
+    course: "_Course", x: Array, bounds: tuple[Array, Array], accuracy: float, evaluations: int
+) -> OptimizeResult:
+    """Lead a course on from x, (k,), as far as its slopes lead.
+
+    As a change from x, since the trust region is at first as large as what it is given, or one for
+    zero: where a fit begins is no measure of how far a first step may lead.
+    """
+
+    def residuals(change: Array) -> Array:
+        return course.residuals(x + change)
+
+    def slopes(change: Array) -> Array:
+        return course.slopes(x + change)
+
+    low, high = bounds
+    return least_squares(
+        residuals,
+        np.zeros_like(x),
+        jac=slopes,
+        bounds=(low - x, high - x),
+        loss="soft_l1" if course.robust else "linear",
+        xtol=LEAST_STEP,
+        ftol=accuracy,
+        max_nfev=evaluations,
     )
 
 
@@ -286,39 +306,37 @@ class _Course:
     """The way of a fit: residuals, and slopes that are corrected from step to step (Broyden 1965).
 
     Slopes cost as many runs as there are parameters. They are taken anew where a step takes away
-    much less than they promise, and once more where a fit would end by corrected ones. Points are
-    a change from the start, (k,): the trust region is at first as large as what it is given, or one
-    for zero, and where a fit begins is no measure of how far a first step may lead.
+    much less than they promise, and once more where a fit would end by corrected ones.
 
     known: (n + k, k), the slopes.
     """
 
-    def __init__(self, held: _Held, start: Array, *, robust: bool) -> None:
-        self._held, self._start, self._robust = held, start, robust
-        self._last = self._at = (np.full_like(start, np.nan), start)  # points, residuals there
+    def __init__(self, held: _Held, *, robust: bool) -> None:
+        self._held, self.robust = held, robust
+        self._last = self._at = (np.empty(0), np.empty(0))  # points, residuals there
         self.known = np.empty(0)
         self._taken = self._sound = False  # known at `_at`, not corrected; and so before the step
         self._begins = True
 
-    def residuals(self, change: Array) -> Array:
-        """Return the residuals, (n + k,), at a point. A copy: robust fits write into them."""
+    def residuals(self, x: Array) -> Array:
+        """Return the residuals, (n + k,), at x, (k,). A copy: robust fits write into them."""
         for point, values in (self._last, self._at):
-            if np.array_equal(point, change):
+            if np.array_equal(point, x):
                 return values.copy()
-        values = np.asarray(self._held.residuals((self._start + change)[None])[0])
-        self._last = (change.copy(), values)
+        values = np.asarray(self._held.residuals(x[None])[0])
+        self._last = (x.copy(), values)
         return values.copy()
 
-    def slopes(self, change: Array) -> Array:
-        """Return the slopes, (n + k, k), at a point to which a step has led, or the first one."""
-        after = self.residuals(change)
+    def slopes(self, x: Array) -> Array:
+        """Return the slopes, (n + k, k), at x, (k,): where a fit begins or a step has led to."""
+        after = self.residuals(x)
         if self._begins:
             self._begins, self._sound = False, True
-            self._take(change)
+            self._take(x)
         else:
             self._sound = self._taken
-            self._follow(change, after)
-        self._at = (change.copy(), after)
+            self._follow(x, after)
+        self._at = (x.copy(), after)
         return self.known.copy()
 
     def ends(self) -> bool:
@@ -329,23 +347,23 @@ class _Course:
         self._begins = not self._sound
         return self._sound
 
-    def _follow(self, change: Array, after: Array) -> None:
+    def _follow(self, x: Array, after: Array) -> None:
         """Correct the slopes by what a step has led to, residuals (n + k,), or take them anew."""
-        before, step = self._at[1], change - self._at[0]
+        before, step = self._at[1], x - self._at[0]
         foreseen = before + self.known @ step
         gained = self._cost(before) - self._cost(after)
-        if gained > KEPT * (self._cost(before) - self._cost(foreseen)):
+        if gained > FOLLOWED * (self._cost(before) - self._cost(foreseen)):
             self.known, self._taken = _corrected(self.known, step, after - foreseen), False
         else:
-            self._take(change)
+            self._take(x)
 
-    def _take(self, change: Array) -> None:
-        if not (self._taken and np.array_equal(change, self._at[0])):
-            self.known, self._taken = self._held.slopes(self._start + change)[1], True
+    def _take(self, x: Array) -> None:
+        if not (self._taken and np.array_equal(x, self._at[0])):
+            self.known, self._taken = self._held.slopes(x)[1], True
 
     def _cost(self, residuals: Array) -> float:
         squares = np.square(residuals)
-        return float(np.sum(2.0 * (np.sqrt(1.0 + squares) - 1.0) if self._robust else squares))
+        return float(np.sum(2.0 * (np.sqrt(1.0 + squares) - 1.0) if self.robust else squares))
 
 
 def _told(slopes: Array) -> NDArray[np.bool_]:

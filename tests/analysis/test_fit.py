@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.signals import Array
@@ -141,6 +142,48 @@ def test_a_descent_goes_on_from_what_a_fit_to_a_part_of_the_data_knows(seed: int
     part = 0.25 * valley.curvature + np.eye(SIZE)  # half as well known, and held
     assert valley.excess(valley.start) > 50.0
     assert valley.excess(valley.descended(part).x) < 0.0
+
+
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_fit_ends_where_one_with_exact_slopes_does(seed: int, *, robust: bool) -> None:
+    """Its own are corrected from step to step: they must not let it end before. By scipy's own."""
+    random = np.random.default_rng(seed)
+    slopes = random.normal(size=(300, SIZE)) * np.logspace(2.0, 0.0, SIZE)
+    true, noise = random.normal(size=SIZE), random.normal(size=300)
+    bend = 30.0  # residuals curve over as much: where a fit begins slopes are others altogether
+
+    def curved(x: Array) -> Array:
+        return np.asarray(bend * np.sinh((x - true) @ slopes.T / bend).clip(-1e6, 1e6) + noise)
+
+    def exact(x: Array) -> Array:
+        return np.asarray(np.cosh(slopes @ (x - true) / bend)[:, None] * slopes)
+
+    start, bound = true + 0.3 * random.normal(size=SIZE), np.full(SIZE, FAR)
+    loss = "soft_l1" if robust else "linear"
+    best = least_squares(curved, start, exact, loss=loss, xtol=1e-12, ftol=1e-12)
+    problem = Problem(curved, start, -bound, bound, np.zeros(SIZE, dtype=bool))
+    found = fit(problem, 1e-3, robust=robust).x
+    reached = least_squares(curved, found, exact, loss=loss, max_nfev=1)
+    assert reached.cost < 1.003 * best.cost
+
+
+def test_a_fit_needs_less_than_half_as_many_slopes_as_one_that_takes_them_at_each_step() -> None:
+    """Each costs as many runs as there are parameters. By scipy's own fit of the same residuals."""
+    valley, asked = Valley(0, 0.0), [0]
+
+    def bent(points: Array) -> Array:
+        return np.asarray(points + 0.3 * np.sin(3.0 * points))
+
+    def model(points: Array) -> Array:
+        asked[0] += len(points) > 1
+        return valley.model(bent(points))
+
+    bound, free = np.full(SIZE, 5.0), np.zeros(SIZE, dtype=bool)
+    solution = fit(Problem(model, valley.start, -bound, bound, free), 1e-6)
+    plain = least_squares(lambda x: valley.model(bent(x)[None])[0], valley.start, ftol=1e-6)
+    assert valley.excess(bent(solution.x)) < valley.excess(bent(plain.x)) + 1.0
+    assert 2 * asked[0] < plain.njev
 
 
 @both

@@ -95,10 +95,10 @@ def fit(
         x, spent = x + result.x, spent + result.nfev
         if spent >= evaluations or course.ends():
             break
-    slopes = course.known
+    slopes = np.asarray(result.jac)  # of a robust fit as its residuals count
     return Solution(
         np.clip(x, low, high),
-        held.covariance(slopes, course.residuals(x)),
+        held.covariance(slopes, result.fun),
         math.sqrt(2.0 * result.cost / result.fun.size),
         slopes.T @ slopes,
     )
@@ -307,19 +307,17 @@ class _Course:
 
     Slopes cost as many runs as there are parameters. They are taken anew where a step takes away
     much less than they promise, and once more where a fit would end by corrected ones.
-
-    known: (n + k, k), the slopes.
     """
 
     def __init__(self, held: _Held, *, robust: bool) -> None:
         self._held, self.robust = held, robust
         self._last = self._at = (np.empty(0), np.empty(0))  # points, residuals there
-        self.known = np.empty(0)
+        self._known = np.empty(0)
         self._taken = self._sound = False  # known at `_at`, not corrected; and so before the step
         self._begins = True
 
     def residuals(self, x: Array) -> Array:
-        """Return the residuals, (n + k,), at x, (k,). A copy: robust fits write into them."""
+        """Return a copy of the residuals, (n + k,), at x, (k,): robust fits write into it."""
         for point, values in (self._last, self._at):
             if np.array_equal(point, x):
                 return values.copy()
@@ -337,7 +335,7 @@ class _Course:
             self._sound = self._taken
             self._follow(x, after)
         self._at = (x.copy(), after)
-        return self.known.copy()
+        return self._known.copy()
 
     def ends(self) -> bool:
         """Tell whether a fit that would go no further was led by slopes that were not corrected.
@@ -350,16 +348,16 @@ class _Course:
     def _follow(self, x: Array, after: Array) -> None:
         """Correct the slopes by what a step has led to, residuals (n + k,), or take them anew."""
         before, step = self._at[1], x - self._at[0]
-        foreseen = before + self.known @ step
+        foreseen = before + self._known @ step
         gained = self._cost(before) - self._cost(after)
         if gained > FOLLOWED * (self._cost(before) - self._cost(foreseen)):
-            self.known, self._taken = _corrected(self.known, step, after - foreseen), False
+            self._known, self._taken = _corrected(self._known, step, after - foreseen), False
         else:
             self._take(x)
 
     def _take(self, x: Array) -> None:
         if not (self._taken and np.array_equal(x, self._at[0])):
-            self.known, self._taken = self._held.slopes(x)[1], True
+            self._known, self._taken = self._held.slopes(x)[1], True
 
     def _cost(self, residuals: Array) -> float:
         squares = np.square(residuals)

@@ -230,7 +230,7 @@ def _columns(file: Path) -> dict[str, Column]:
                 f" column_unit: {source.unit}, unit: {UNITS[source.unit][0]}"
             )
         unit = str(entry.get("column_unit", source.unit))
-        si, factor = UNITS.get(unit, (unit, 1.0)) if unit != source.unit else (unit, 1.0)
+        si, factor = UNITS.get(unit, (unit, 1.0))
         if si != source.unit:
             raise InputError(f"{file}: {name}: a column in {unit} is no signal in {source.unit}")
         found[name] = Column(str(entry["column"]), source, factor)

@@ -17,6 +17,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fit import (
     DIFFERENCE_STEP,
+    STRAIGHT_STEP,
     Problem,
     Solution,
     covariance,
@@ -29,6 +30,7 @@ from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
+from emir_plant.integration import STEP
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
@@ -47,6 +49,7 @@ MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 SHORTEST_FOLLOWED, FOLLOWED_GROWTH = 5.0, 1.5  # s, and times, of a beginning that grows
 BEGINNING_EXPLAINED = 1.15  # RMS error in units of the noise, the most
+DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
 SETTLING = 5.0  # s from the start in which the state at rest is found
 RESTS = 21  # pressures at rest, from the least to the most, that are tried where none is shown
 
@@ -87,6 +90,23 @@ class Trial:
         others = tuple(name for name in self.effects if name != effect)
         gone = [u.path for u in self.unknowns.members if u.path.startswith(f"effects.{effect}.")]
         return replace(self._less(gone), effects=others)
+
+    def cost_without(self, effect: str) -> float:
+        """Return by how much leaving an effect out adds to the squared errors, to first order.
+
+        In units of the noise, all else doing its best. 0 where that is not told, as for an effect
+        that is not off with sizes of 0.
+        """
+        paths = [f"effects.{effect}.{size}" for size in self._sizes(effect)]
+        members = self.unknowns.members
+        sizes = [k for k, u in enumerate(members) if u.path in paths]
+        if any(members[k].logarithmic for k in sizes):
+            return 0.0
+        spread = self.covariance[np.ix_(sizes, sizes)]
+        if not np.all(np.isfinite(spread)):
+            return 0.0
+        off = self.x[sizes] - [members[k].at(0.0) for k in sizes]
+        return float(off @ np.linalg.pinv(spread) @ off)
 
     def with_one_size(self, effect: str, size: str) -> "Trial":
         """Return the trial with the other sizes of an effect at 0, no longer to be fitted."""
@@ -257,24 +277,33 @@ def moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:
 def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Trial:
     """Fit a trial that was fitted to a part of the recordings' free run to the whole.
 
-    In the end with slopes of the free run itself, over short steps: near the optimum the coarse
-    ones point a little beside it. A hopeless trial is not polished, nor one far behind its rival.
+    In the end with slopes over short steps: near the optimum those of the way there point a little
+    beside it. A hopeless trial is not polished, nor one far behind its rival.
     """
     problem = _whole_problem(known, evidence)
     near = fit(problem, FREE_RUN_ACCURACY)
     behind = math.inf if rival is None else BEHIND * math.sqrt(mean_square(rival, evidence))
     if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
-    fine = replace(problem, start=near.x, coarse=None, step=DIFFERENCE_STEP)
+    fine = replace(problem, start=near.x, step=DIFFERENCE_STEP)
+    if {*DRY, "backlash"} & {*known.effects}:  # coarse steps do not follow what stops and seats
+        fine = replace(fine, coarse=None)
     accuracy = FINE_ACCURACY if near.misfit <= POLISHED else FREE_RUN_ACCURACY
     return known.continued(fit(fine, accuracy))
 
 
 def with_spread(known: Trial, evidence: Evidence) -> Trial:
-    """Return a trial fitted to the whole with the covariance that short steps tell."""
+    """Return a trial fitted to the whole with the covariance that short steps tell.
+
+    Over a shorter time than an integration step a load that sets in at once does not change.
+    """
     problem = _whole_problem(known, evidence)
     k = known.x.size
-    return replace(known, covariance=covariance(problem)[:k, :k])
+    steps = np.full(problem.start.size, STRAIGHT_STEP)
+    for i, unknown in enumerate(known.unknowns.members):
+        if unknown.shapes and unknown.unit == "s":
+            steps[i] = unknown.at(unknown.value(known.x[i]) + STEP) - known.x[i]
+    return replace(known, covariance=covariance(problem, steps)[:k, :k])
 
 
 def following(known: Trial, evidence: Evidence) -> Trial:

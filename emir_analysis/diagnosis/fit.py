@@ -10,7 +10,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from emir_analysis.signals import Array
 
-STRAIGHT_STEP = 1e-6  # as DIFFERENCE_STEP, where no fit has to get anywhere by them
+STRAIGHT_STEP = 1e-6  # as DIFFERENCE_STEP, so short that slopes are straight
 DIFFERENCE_STEP = 1e-3  # of the finite differences, in units of the tolerance or the trial value
 TOLERANCE_SPREAD = 1.0 / math.sqrt(3.0)  # standard deviation of a parameter inside its tolerance
 HELD = 0.1  # residual, in units of the noise, of a parameter one off where its fit begins
@@ -45,7 +45,7 @@ class Problem:
     high: Array
     stated: NDArray[np.bool_]
     coarse: Callable[[Array], Array] | None = None
-    step: float = DIFFERENCE_STEP
+    step: float | Array = DIFFERENCE_STEP
     curvature: Array | None = None
 
 
@@ -132,14 +132,14 @@ def _trust_region(
     )
 
 
-def covariance(problem: Problem) -> Array:
+def covariance(problem: Problem, steps: Array) -> Array:
     """Return the covariance, (k, k), of parameters that were fitted, from slopes at the start.
 
-    Over steps so short that they are straight: where two parameters do the same, such as a hose
+    steps: (k,), so short that they are straight: where two parameters do the same, such as a hose
     and the volume it is connected to, slopes that bend by different amounts would seem to part
     them.
     """
-    held = _Held(replace(problem, coarse=None, step=STRAIGHT_STEP), problem.start)
+    held = _Held(replace(problem, coarse=None, step=steps), problem.start)
     residuals, slopes = held.slopes(problem.start)
     return held.covariance(slopes, residuals)
 
@@ -195,7 +195,7 @@ def _impossible(start: Array) -> Solution:
     return Solution(start, untold, math.inf, np.zeros_like(untold))
 
 
-def steps_inside(x: Array, step: float, high: Array) -> Array:
+def steps_inside(x: Array, step: float | Array, high: Array) -> Array:
     """Return the steps of finite differences, (k,): back where one ahead leaves the bounds."""
     return np.where(x + step > high, -step, step)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import Trial, trial
+from emir_analysis.diagnosis.candidates import DRY, Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
@@ -13,7 +13,6 @@ from emir_common.parameter_tree import declared
 from emir_plant.sheet import Sheet
 
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
-DRY = (COULOMB, STRIBECK, "pressure_dependent_friction")
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
 DAMPED, MOST_DAMPED = 1e-3, 0.05  # s, by their damping: where a fit begins, and the most

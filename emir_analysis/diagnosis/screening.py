@@ -47,6 +47,8 @@ SMALL = 0.1  # trial sizes, at which a machine is near enough to the known one
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
+NEAR_BEST = 2.0  # times the least cost: what leaves more does not come to it by other shares
+SILENT = 0.5  # cost of a residual, of which noise makes 0.35: nothing is left to be explained
 COST_DECIMALS = 6  # decimals of the cost, to which what leaves the same is told from rounding
 LOAD = "external_load"
 AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
@@ -141,7 +143,8 @@ class _Candidate:
 
     def _best(self, starts: list[Array]) -> tuple[Array, Array]:
         """Return the best of some fields, (k,), inside their bounds, and what is left there."""
-        points = np.clip(starts, *self.bounds)
+        inside = np.clip(starts, *self.bounds)
+        points = np.array(list(dict.fromkeys(map(tuple, inside))))  # bounds make some of them one
         residuals = self._inside(points)
         best = int(np.argmin([soft(row) for row in residuals]))
         return points[best], residuals[best]
@@ -259,9 +262,11 @@ class OnBalances:
         """
         promising = sorted(self._begun, key=lambda c: c.expected)[:MOST_FITTED]
         found = sorted(((c.fitted(), c) for c in promising), key=lambda pair: pair[0].cost)
-        again = [c.fitted_again(screened) for screened, c in found[:MOST_AGAIN]]
-        others = [screened for screened, _ in found[MOST_AGAIN:]]
-        return sorted([*again, *others], key=lambda s: s.cost)
+        least, silent = found[0][0].cost, SILENT * self._left.nothing.size
+        for k, (screened, candidate) in enumerate(found[:MOST_AGAIN]):
+            if silent < screened.cost <= NEAR_BEST * least:
+                found[k] = candidate.fitted_again(screened), candidate
+        return sorted((screened for screened, _ in found), key=lambda s: s.cost)
 
     def pairs(self) -> list[Screened]:
         """Return the known trial with two further effects, the best first.

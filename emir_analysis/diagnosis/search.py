@@ -196,16 +196,17 @@ class Search:
         """Return a trial without the effect that is least needed, if one is not."""
         if not chosen.effects or not self._enough(self.whole.fitted(chosen)):
             return chosen
-        least = self.whole.score(self.whole.fitted(chosen)) + STRONG
+        full = self.whole.fitted(chosen)
+        least = self.whole.score(full) + STRONG
         enough = []
         for effect in chosen.effects:
-            if effect in self._settled:
+            if effect in self._settled or self._hopeless_without(full, effect):
                 continue
-            fewer = self.whole.fitted(chosen).without(effect)
+            fewer = full.without(effect)
             if not fewer.effects and self._excess(self.refitted) > beyond(EXPLAINED):
                 continue
             self._progress(f"fitting without: {effect}")
-            fitted = self.whole.better(refine_free_run(fewer, self._evidence))
+            fitted = self.whole.better(refine_free_run(fewer, self._evidence, full))
             if self.whole.score(fitted) < least and self._enough(fitted):
                 enough.append(fitted)
         if not enough:
@@ -213,6 +214,15 @@ class Search:
         best = min(enough, key=self.whole.score)
         self.whole.keep(best)
         return self.needed(best)
+
+    def _hopeless_without(self, full: Trial, effect: str) -> bool:
+        """Tell whether a trial is so far off without one of its effects that no fit is worthwhile.
+
+        To first order, so only where that is far more than what has to be left: beyond it, what
+        else is fitted may do better than along straight lines.
+        """
+        count = sum(error.size for error in free_run_errors(full.machine, self._evidence))
+        return full.cost_without(effect) > beyond(HOPELESS) * count
 
     def _known_whole(self, best: Tried) -> Tried:
         """Return a trial as the whole recordings have it, if it is near them.
@@ -437,15 +447,16 @@ class Search:
         Of several sizes of an effect one alone is taken where the others are not worth their while.
         A load may have ended since. Where all that leads nowhere near, what else is missing drives
         the free run away and the parameters with it: they stay as the balances say, if those are
-        all told.
+        all told. Nor do fewer terms of a series lead anywhere then.
         """
         full = fit_free_run(tried.trial, self._head)
-        if self._evidence.complete and excess(full, self._head) > beyond(HOPELESS):
+        hopeless = excess(full, self._head) > beyond(HOPELESS)
+        if self._evidence.complete and hopeless:
             return replace(tried, free_run=free_run_score(full, self._evidence))
         ways = [full]
         for effect in full.effects:
             if REGISTRY[effect].is_series:
-                ways += with_fewer_terms(full, effect, self._head)
+                ways += [] if hopeless else with_fewer_terms(full, effect, self._head)
             else:
                 ways += full.with_each_size(effect)
         if LOAD in full.effects:

@@ -158,7 +158,7 @@ class Whole:
 
         Over the time that it acts a slow swing is the same as a steady load.
         """
-        if LOAD not in fitted.effects:
+        if LOAD not in fitted.effects or self._excess(fitted) > beyond(HOPELESS):
             return fitted
         start = f"effects.{LOAD}."
         paths = [unknown.path for unknown in fitted.unknowns.members]

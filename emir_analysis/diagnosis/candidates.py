@@ -94,8 +94,8 @@ class Trial:
     def cost_without(self, effect: str) -> float:
         """Return by how much leaving an effect out adds to the squared errors, to first order.
 
-        In units of the noise, all else doing its best. 0 where that is not told, as for an effect
-        that is not off with sizes of 0.
+        In units of the noise, all else doing its best. 0 where that is not told, and where a size
+        is fitted by its logarithm, since that is never 0.
         """
         paths = [f"effects.{effect}.{size}" for size in self._sizes(effect)]
         members = self.unknowns.members

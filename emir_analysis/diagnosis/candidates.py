@@ -29,8 +29,8 @@ from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
+from emir_plant import integration
 from emir_plant.effects import REGISTRY
-from emir_plant.integration import STEP
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
@@ -50,6 +50,7 @@ SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fi
 SHORTEST_FOLLOWED, FOLLOWED_GROWTH = 5.0, 1.5  # s, and times, of a beginning that grows
 BEGINNING_EXPLAINED = 1.15  # RMS error in units of the noise, the most
 DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
+STOPPING = {*DRY, "backlash"}  # under which the piston stops or seats: coarse steps do not follow
 SETTLING = 5.0  # s from the start in which the state at rest is found
 RESTS = 21  # pressures at rest, from the least to the most, that are tried where none is shown
 
@@ -97,9 +98,8 @@ class Trial:
         In units of the noise, all else doing its best. 0 where that is not told, and where a size
         is fitted by its logarithm, since that is never 0.
         """
-        paths = [f"effects.{effect}.{size}" for size in self._sizes(effect)]
-        members = self.unknowns.members
-        sizes = [k for k, u in enumerate(members) if u.path in paths]
+        members, own = self.unknowns.members, f"effects.{effect}."
+        sizes = [k for k, u in enumerate(members) if u.path.startswith(own) and not u.shapes]
         if any(members[k].logarithmic for k in sizes):
             return 0.0
         spread = self.covariance[np.ix_(sizes, sizes)]
@@ -286,7 +286,7 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
     if near.misfit > min(HOPELESS, behind):
         return known.continued(near)
     fine = replace(problem, start=near.x, step=DIFFERENCE_STEP)
-    if {*DRY, "backlash"} & {*known.effects}:  # coarse steps do not follow what stops and seats
+    if STOPPING.intersection(known.effects):
         fine = replace(fine, coarse=None)
     accuracy = FINE_ACCURACY if near.misfit <= POLISHED else FREE_RUN_ACCURACY
     return known.continued(fit(fine, accuracy))
@@ -302,7 +302,7 @@ def with_spread(known: Trial, evidence: Evidence) -> Trial:
     steps = np.full(problem.start.size, STRAIGHT_STEP)
     for i, unknown in enumerate(known.unknowns.members):
         if unknown.shapes and unknown.unit == "s":
-            steps[i] = unknown.at(unknown.value(known.x[i]) + STEP) - known.x[i]
+            steps[i] = unknown.at(unknown.value(known.x[i]) + integration.STEP) - known.x[i]
     return replace(known, covariance=covariance(problem, steps)[:k, :k])
 
 

@@ -35,8 +35,8 @@ class Problem:
     stated: (k,) true for parameters that a maker states: they are held to their stated value as
     weakly as their tolerance says, so that what the data cannot tell stays where it is.
     coarse: a cheaper model with the same slopes, from which the Jacobian is taken. step: of its
-    finite differences. curvature: (k, k) of a fit to a part of the data, if there was one: a
-    descent takes its first slopes along its principal axes.
+    finite differences, one or (k,). curvature: (k, k) of a fit to a part of the data, if there was
+    one: a descent takes its first slopes along its principal axes.
     """
 
     model: Callable[[Array], Array]

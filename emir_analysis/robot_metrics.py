@@ -1,8 +1,8 @@
 """Figures of a run of the whole robot: of each joint, of the TCP, of the supply."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from emir_analysis.metrics import Metric
 from emir_analysis.root_mean_square import rms
@@ -96,7 +96,7 @@ def path_error(run: Recording) -> Array:
     points = reference(run)
     fine = np.linspace(0.0, len(points) - 1.0, DENSER * len(points))
     between = [np.interp(fine, np.arange(len(points)), column) for column in points.T]
-    distance, _ = cKDTree(np.stack(between, axis=1)).query(tcp(run))
+    distance, _ = scipy.spatial.cKDTree(np.stack(between, axis=1)).query(tcp(run))
     return np.asarray(distance)
 
 

@@ -10,8 +10,8 @@ the points over the way w along the path, bending under the weight included,
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from emir_control.arm import GRAVITY, JOINTS, Arm
 
@@ -30,7 +30,7 @@ def torques_along(arm: Arm, ways: Array, joints: Array) -> Array:
     """
     masses = _masses(arm)
     points = np.array([_points(arm, row) for row in joints])
-    flat = CubicSpline(ways, points.reshape(len(ways), -1))
+    flat = scipy.interpolate.CubicSpline(ways, points.reshape(len(ways), -1))
     moved = (flat(ways, k).reshape(points.shape) for k in (2, 1))
     weight = np.broadcast_to([0.0, 0.0, GRAVITY], points.shape)
     pulls = masses[:, np.newaxis] * np.stack([weight, *moved], axis=1)  # (n, 3, points, 3)

@@ -9,8 +9,8 @@ joint, N m.
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import null_space
 
 from emir_common.quantity import ParameterError
 
@@ -51,7 +51,7 @@ class Boom:
         """Return how the boom bends under a given motion of the joint."""
         rigid = np.zeros_like(self.joint)
         rigid[0] = 1.0 / self.joint[0]
-        basis = null_space(self.joint[None, :])
+        basis = scipy.linalg.null_space(self.joint[None, :])
         squares, vectors = np.linalg.eigh(basis.T @ (self.stiffness[:, None] * basis))
         shapes = basis @ vectors
         return ClampedBoom(

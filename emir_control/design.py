@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from emir_common.quantity import ParameterError
 from emir_control.force_loop import ForceLoopParameters
@@ -54,7 +54,7 @@ def reduced(model: InternalModel, order: int) -> InternalModel:
     rest, integrator = _split(model)
     A, B, C = _balanced(*rest, order - 1)
     return InternalModel(
-        linalg.block_diag(np.ones((1, 1)), A),
+        scipy.linalg.block_diag(np.ones((1, 1)), A),
         np.append(integrator, B),
         np.append(1.0, C),
         model.period,
@@ -63,19 +63,19 @@ def reduced(model: InternalModel, order: int) -> InternalModel:
 
 def _split(model: InternalModel) -> tuple[tuple[Array, Array, Array], float]:
     """Return the stable part (A, B, C) and the gain b of the integrator b / (z - 1)."""
-    distance = np.sort(abs(linalg.eigvals(model.A) - 1.0))
+    distance = np.sort(abs(scipy.linalg.eigvals(model.A) - 1.0))
     if distance[0] > INTEGRATOR:
         raise ParameterError(
             f"the model has no integrator: its slowest pole is {distance[0]:.2g} off 1"
         )
     between = 0.5 * (distance[0] + distance[1])
-    T, Z, _ = linalg.schur(model.A, sort=lambda re, im: np.hypot(re - 1.0, im) > between)
+    T, Z, _ = scipy.linalg.schur(model.A, sort=lambda re, im: np.hypot(re - 1.0, im) > between)
     # T = [[stable, coupling], [0, integrator]]; a Sylvester equation takes the coupling away.
     n = model.order - 1
-    X = linalg.solve_sylvester(T[:n, :n], -T[n:, n:], -T[:n, n:])
+    X = scipy.linalg.solve_sylvester(T[:n, :n], -T[n:, n:], -T[:n, n:])
     B, C = Z.T @ model.B, model.C @ Z
     stable = T[:n, :n], B[:n] - X[:, 0] * B[n], C[:n]
-    if max(abs(linalg.eigvals(stable[0]))) >= 1.0:
+    if max(abs(scipy.linalg.eigvals(stable[0]))) >= 1.0:
         raise ParameterError("the model is unstable beside its integrator")
     return stable, float((C[:n] @ X[:, 0] + C[n]) * B[n])
 
@@ -84,7 +84,7 @@ def _balanced(A: Array, B: Array, C: Array, order: int) -> tuple[Array, Array, A
     """Return the balanced truncation of a stable model (square-root method, Moore 1981)."""
     reach = _root(_gramian(A, B))
     observe = _root(_gramian(A.T, C))
-    U, hankel, V = linalg.svd(observe.T @ reach)
+    U, hankel, V = scipy.linalg.svd(observe.T @ reach)
     if hankel[order - 1] < np.finfo(float).eps * hankel[0]:
         raise ParameterError(f"order = {order + 1}: the model has nothing more to keep")
     scale = 1.0 / np.sqrt(hankel[:order])
@@ -94,12 +94,12 @@ def _balanced(A: Array, B: Array, C: Array, order: int) -> tuple[Array, Array, A
 
 def _gramian(A: Array, B: Array) -> Array:
     """Return X = A X A^T + B B^T. By Schur's form: it takes badly scaled states, too."""
-    return np.asarray(linalg.solve_discrete_lyapunov(A, np.outer(B, B), method="bilinear"))
+    return np.asarray(scipy.linalg.solve_discrete_lyapunov(A, np.outer(B, B), method="bilinear"))
 
 
 def _root(gramian: NDArray[Any]) -> Array:
     """Return R with R R^T = gramian, which may be singular."""
-    values, vectors = linalg.eigh(gramian)
+    values, vectors = scipy.linalg.eigh(gramian)
     return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
 
 
@@ -123,8 +123,10 @@ def with_observer(model: InternalModel, noise: Noise) -> InternalModel:
     n = model.order
     A = np.block([[model.A, model.B[:, None]], [np.zeros((1, n)), np.ones((1, 1))]])
     B, C = np.append(model.B, 0.0), np.append(model.C, 0.0)
-    drive = noise.disturbance**2 * linalg.block_diag(np.outer(model.B, model.B), np.ones((1, 1)))
-    P = linalg.solve_discrete_are(A.T, C[:, None], drive, np.array([[noise.output**2]]))
+    drive = noise.disturbance**2 * scipy.linalg.block_diag(
+        np.outer(model.B, model.B), np.ones((1, 1))
+    )
+    P = scipy.linalg.solve_discrete_are(A.T, C[:, None], drive, np.array([[noise.output**2]]))
     return InternalModel(A, B, C, model.period, P @ C / (C @ P @ C + noise.output**2))
 
 
@@ -164,7 +166,7 @@ def spectral_radius(law: Pfc | Sequence[Part], machine: InternalModel) -> float:
     against each other changes nothing. That one pole at 1, of each law, is left out.
     """
     parts = [(law, 1.0)] if isinstance(law, Pfc) else law
-    poles = linalg.eigvals(closed_loop(parts, machine))
+    poles = scipy.linalg.eigvals(closed_loop(parts, machine))
     for part, _ in parts:
         if part.parameters.model.observer is None:
             poles = np.delete(poles, np.argmin(abs(poles - 1.0)))

@@ -15,9 +15,8 @@ linear programs are the velocities, so a plan is one that can be followed exactl
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.optimize import linprog
 
 from emir_control.boom import Boom, ClampedBoom
 from emir_control.least_bending import NoMotionError
@@ -173,7 +172,7 @@ def _held(boom: Boom, drive: Drive, period: float) -> Array:
     model[rate, :-1] = joint
     model[pushed, rate] = -(drive.arm + drive.slope / drive.stiffness)
     model[pushed, -1] = 1.0
-    return np.asarray(expm(period / SUBSTEPS * model))
+    return np.asarray(scipy.linalg.expm(period / SUBSTEPS * model))
 
 
 def _kernel(held: Array, count: int) -> Array:
@@ -220,7 +219,7 @@ class _Program:
         """Return (u, w) with the smallest sum of the further unknowns w; above (u, w) <= most."""
         count, drive = self._task.count, self._drive
         further = above.shape[1] - count
-        found = linprog(
+        found = scipy.optimize.linprog(
             np.append(np.zeros(count), np.ones(further)),
             above,
             most,

@@ -8,9 +8,8 @@ clamped at the joint. At the end nothing moves and nothing swings.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm, toeplitz
-from scipy.optimize import linprog
 
 from emir_control.boom import ClampedBoom
 
@@ -59,13 +58,13 @@ def limit(boom: ClampedBoom, task: Task) -> Motion:
     """
     n, modes = task.count, len(boom.drive)
     states = _responses(boom, n)
-    bending = toeplitz(states @ boom.C, np.zeros(n))
+    bending = scipy.linalg.toeplitz(states @ boom.C, np.zeros(n))
     rates = STEP * np.tri(n)
     turn = STEP * STEP * (n - np.arange(n) - 0.5)
     rest = np.vstack([rates[-1:], states[::-1].T[: 2 * modes]])
     scale = float(abs(bending).max())  # of the one unknown beside the accelerations
     bound, none = np.full((n, 1), -scale), np.zeros((n, 1))
-    found = linprog(
+    found = scipy.optimize.linprog(
         np.append(np.zeros(n), 1.0),
         np.block([[bending, bound], [-bending, bound], [rates, none], [-rates, none]]),
         np.repeat([0.0, 0.0, task.high, -task.low], n),
@@ -88,7 +87,7 @@ def limit(boom: ClampedBoom, task: Task) -> Motion:
 def _responses(boom: ClampedBoom, count: int) -> Array:
     """Return (z, z'), (count, 2 m), after 1, 2 ... steps, the first with an acceleration of 1."""
     n = len(boom.B)
-    held = expm(STEP * np.block([[boom.A, boom.B[:, None]], [np.zeros((1, n + 1))]]))
+    held = scipy.linalg.expm(STEP * np.block([[boom.A, boom.B[:, None]], [np.zeros((1, n + 1))]]))
     states = [held[:n, n]]
     for _ in range(count - 1):
         states.append(held[:n, :n] @ states[-1])

@@ -13,8 +13,8 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_control.lqg import Lqg, LqgState, Now
@@ -92,10 +92,8 @@ class Problem:
         self._unit, self._count = unit, count
         self._solver: Any = osqp.OSQP()
         bounds = np.full(len(rows), np.inf)
-        self._solver.setup(
-            csc_matrix(np.triu(hessian)), np.zeros(count + 1), csc_matrix(rows),
-            -bounds, bounds, **SETTINGS,
-        )  # fmt: skip
+        quadratic, constraints = map(scipy.sparse.csc_matrix, (np.triu(hessian), rows))
+        self._solver.setup(quadratic, np.zeros(count + 1), constraints, -bounds, bounds, **SETTINGS)
 
     def solve(self, off: Array, ends: tuple[Array, Array], bend: Array, most: float) -> float:
         """Return the first u + d, m/s, or NaN. bend, most: m, as planned and at most."""

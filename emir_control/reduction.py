@@ -8,8 +8,8 @@ wheel.)
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from emir_common.quantity import ParameterError
 
@@ -44,7 +44,7 @@ def balanced(model: Linear, order: int) -> Linear:
     slow, rest = _split(model)
     _check(order, slow.order, model.order)
     reach, observe = _roots(rest)
-    U, sizes, V = linalg.svd(observe.T @ reach)
+    U, sizes, V = scipy.linalg.svd(observe.T @ reach)
     n, kept = int(np.count_nonzero(sizes > NOTHING * sizes[0])), order - slow.order
     if kept > n:
         raise ParameterError(f"order = {order}: the model has nothing more to keep")
@@ -57,7 +57,7 @@ def balanced(model: Linear, order: int) -> Linear:
 def _at_rest(model: Linear, kept: int) -> Linear:
     """Return the model whose states from `kept` on follow the others at once."""
     A, B, C = model.A, model.B, model.C
-    follow = -linalg.solve(A[kept:, kept:], np.hstack((A[kept:, :kept], B[kept:])))
+    follow = -scipy.linalg.solve(A[kept:, kept:], np.hstack((A[kept:, :kept], B[kept:])))
     states, inputs = follow[:, :kept], follow[:, kept:]
     return Linear(
         A[:kept, :kept] + A[:kept, kept:] @ states,
@@ -76,16 +76,18 @@ def modal(model: Linear, order: int) -> Linear:
     """
     slow, rest = _split(model)
     _check(order, slow.order, model.order)
-    poles, vectors = linalg.eig(rest.A)
-    inputs, outputs = linalg.solve(vectors, rest.B.astype(complex)), rest.C @ vectors
-    height = linalg.norm(inputs, axis=1) * linalg.norm(outputs, axis=0) / abs(poles.real)
+    poles, vectors = scipy.linalg.eig(rest.A)
+    inputs, outputs = scipy.linalg.solve(vectors, rest.B.astype(complex)), rest.C @ vectors
+    height = (
+        scipy.linalg.norm(inputs, axis=1) * scipy.linalg.norm(outputs, axis=0) / abs(poles.real)
+    )
     chosen: list[int] = []
     for k in np.argsort(-height):
         size = 2 if poles[k].imag > 0.0 else 1
         if poles[k].imag >= 0.0 and _states(poles, chosen) + size <= order - slow.order:
             chosen.append(int(k))
     A, B, C = _real_form(poles[chosen], inputs[chosen], outputs[:, chosen])
-    static = -rest.C @ linalg.solve(rest.A, rest.B) + C @ linalg.solve(A, B)
+    static = -rest.C @ scipy.linalg.solve(rest.A, rest.B) + C @ scipy.linalg.solve(A, B)
     return _beside(slow, Linear(A, B, C, rest.D + static))
 
 
@@ -93,7 +95,7 @@ def hankel(model: Linear) -> Array:
     """Return the Hankel singular values of the model beside its slow modes, largest first."""
     _, rest = _split(model)
     reach, observe = _roots(rest)
-    return np.asarray(linalg.svdvals(observe.T @ reach))
+    return np.asarray(scipy.linalg.svdvals(observe.T @ reach))
 
 
 def _check(order: int, slow: int, full: int) -> None:
@@ -103,11 +105,11 @@ def _check(order: int, slow: int, full: int) -> None:
 
 def _split(model: Linear) -> tuple[Linear, Linear]:
     """Return slow and fast modes; their outputs add up to the model's."""
-    scaled, (scale, _) = linalg.matrix_balance(model.A, permute=False, separate=True)
+    scaled, (scale, _) = scipy.linalg.matrix_balance(model.A, permute=False, separate=True)
     A, B, C = scaled, model.B / scale[:, None], model.C * scale
-    T, Z, n = linalg.schur(A, sort=lambda re, _: re > -SLOW)
+    T, Z, n = scipy.linalg.schur(A, sort=lambda re, _: re > -SLOW)
     # T = [[slow, coupling], [0, fast]]; a Sylvester equation takes the coupling away.
-    X = linalg.solve_sylvester(T[:n, :n], -T[n:, n:], -T[:n, n:])
+    X = scipy.linalg.solve_sylvester(T[:n, :n], -T[n:, n:], -T[:n, n:])
     B, C = Z.T @ B, C @ Z
     slow = Linear(T[:n, :n], B[:n] - X @ B[n:], C[:, :n], np.zeros_like(model.D))
     return slow, Linear(T[n:, n:], B[n:], C[:, :n] @ X + C[:, n:], model.D)
@@ -115,20 +117,20 @@ def _split(model: Linear) -> tuple[Linear, Linear]:
 
 def _beside(a: Linear, b: Linear) -> Linear:
     return Linear(
-        linalg.block_diag(a.A, b.A), np.vstack((a.B, b.B)), np.hstack((a.C, b.C)), a.D + b.D
+        scipy.linalg.block_diag(a.A, b.A), np.vstack((a.B, b.B)), np.hstack((a.C, b.C)), a.D + b.D
     )
 
 
 def _roots(model: Linear) -> tuple[Array, Array]:
     """Return roots of the reachability and observability gramians of a stable model."""
-    reach = linalg.solve_continuous_lyapunov(model.A, -model.B @ model.B.T)
-    observe = linalg.solve_continuous_lyapunov(model.A.T, -model.C.T @ model.C)
+    reach = scipy.linalg.solve_continuous_lyapunov(model.A, -model.B @ model.B.T)
+    observe = scipy.linalg.solve_continuous_lyapunov(model.A.T, -model.C.T @ model.C)
     return _root(np.asarray(reach)), _root(np.asarray(observe))
 
 
 def _root(gramian: Array) -> Array:
     """Return R with R R^T = gramian, which may be singular."""
-    values, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    values, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
     return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
 
 
@@ -152,5 +154,5 @@ def _real_form(
             blocks.append(np.array([[pole.real, pole.imag], [-pole.imag, pole.real]]))
             rows.append([2.0 * b.real, -2.0 * b.imag])
             columns.append([c.real, c.imag])
-    A = linalg.block_diag(*blocks)
+    A = scipy.linalg.block_diag(*blocks)
     return A, np.vstack([np.array(r) for r in rows]), np.vstack([np.array(c) for c in columns]).T

@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
 
 from emir_common.quantity import check_ranges, quantity
 from emir_control.actuator import Actuator
@@ -176,7 +176,7 @@ def regulator(
         stage[:m, :m] += np.outer(row[:m], row[:m]) / size**2
     stage += 1e-9 * np.eye(len(stage))
     effort = np.array([[1.0 / p.velocity_weight**2]])
-    cost = solve_discrete_are(extended, driven, stage, effort)
+    cost = scipy.linalg.solve_discrete_are(extended, driven, stage, effort)
     feedback = np.linalg.solve(effort + driven.T @ cost @ driven, driven.T @ cost @ extended)[0]
     return Regulator(
         modes=m,
@@ -235,7 +235,7 @@ def _sampled(continuous: Array, period: float, late: float) -> tuple[Array, Arra
     n = len(continuous)
 
     def held(time: float) -> tuple[Array, Array]:
-        both = expm(time * np.vstack([continuous, np.zeros((1, n + 1))]))
+        both = scipy.linalg.expm(time * np.vstack([continuous, np.zeros((1, n + 1))]))
         return both[:n, :n], both[:n, n]
 
     whole, part = divmod(late, period)
@@ -274,6 +274,6 @@ def _kalman(
     noise[-2, -2] += p.flow_drift**2
     noise[-1, -1] += p.load_drift**2
     sensors = np.diag([p.angle_noise, p.bending_noise, p.force_noise / stiffness]) ** 2
-    P = solve_discrete_are(A.T, C.T, noise, sensors)
+    P = scipy.linalg.solve_discrete_are(A.T, C.T, noise, sensors)
     certainty = np.linalg.inv(C @ P @ C.T + sensors)
     return P @ C.T @ certainty, certainty

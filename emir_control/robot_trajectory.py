@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from emir_common.quantity import ParameterError, check_ranges, quantity
 from emir_control.actuator import Actuator
@@ -92,9 +92,9 @@ class Path:
     forces: (3, 6), at rest, per squared speed and per acceleration along the path.
     """
 
-    strokes: CubicSpline
-    places: CubicSpline
-    forces: CubicSpline
+    strokes: "scipy.interpolate.CubicSpline"
+    places: "scipy.interpolate.CubicSpline"
+    forces: "scipy.interpolate.CubicSpline"
 
     def at(self, way: float, speed: float, acceleration: float) -> RobotReference:
         """Return the reference on the way, m, at a speed along it, m/s, that changes, m/s^2."""
@@ -179,7 +179,9 @@ class RobotTrajectory:
         begin = [Reference(*map(float, pair)) for pair in zip(*now[:2], strict=True)]
         strokes = curve(points, self._axes(), begin)
         joints = np.array([self._angles(row) for row in strokes(strokes.x)])
-        places = CubicSpline(strokes.x, np.array([state.arm.tcp(row) for row in joints]))
+        places = scipy.interpolate.CubicSpline(
+            strokes.x, np.array([state.arm.tcp(row) for row in joints])
+        )
         path = Path(strokes, places, _forces(state.arm, self.linkages, strokes.x, joints))
         return RobotTrajectoryState(path, Along(float(strokes.x[-1])), 0, state.arm)
 
@@ -230,7 +232,11 @@ class RobotTrajectory:
             [[of.stroke(a) for of, a in zip(self.linkages, row, strict=True)] for row in joints]
         )
         forces = _forces(self.arm, self.linkages, ways, joints)
-        path = Path(CubicSpline(ways, strokes), CubicSpline(ways, places), forces)
+        path = Path(
+            scipy.interpolate.CubicSpline(ways, strokes),
+            scipy.interpolate.CubicSpline(ways, places),
+            forces,
+        )
         self._check_drives(path.strokes(ways, 1) * speed, path.forces(ways)[:, 0])
         return path
 
@@ -271,10 +277,14 @@ def _each(value: Callable[..., float], drives: Sequence[Actuator], *columns: Arr
     return np.array([[value(*of) for of in zip(drives, *row, strict=True)] for row in rows])
 
 
-def _forces(arm: Arm, linkages: Sequence[Linkage], ways: Array, joints: Array) -> CubicSpline:
+def _forces(
+    arm: Arm, linkages: Sequence[Linkage], ways: Array, joints: Array
+) -> "scipy.interpolate.CubicSpline":
     """Return the pistons' forces over the way; see Path."""
     ratios = np.array([_ratios(linkages, row) for row in joints])
-    return CubicSpline(ways, torques_along(arm, ways, joints) / ratios[:, np.newaxis])
+    return scipy.interpolate.CubicSpline(
+        ways, torques_along(arm, ways, joints) / ratios[:, np.newaxis]
+    )
 
 
 def _ratios(linkages: Sequence[Linkage], angles: Array) -> Array:

@@ -17,8 +17,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from emir_control.actuator import Actuator
 from emir_control.boom import Boom
@@ -73,7 +73,7 @@ class Robustness:
     def best(self, tolerance: float) -> float:
         """Return the softness whose worst ratio is smallest; takes half a minute."""
         ends = 1.0 - tolerance, 1.0 + tolerance
-        found = minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda softness: float(self.ratios(softness, ends).max()),
             bounds=ends,
             method="bounded",

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
 from emir_common.quantity import ParameterError
 from emir_control.trajectory import Braking, Motion, Reference
@@ -70,7 +70,9 @@ class Waypoints:
     velocities: Array
 
 
-def curve(points: Waypoints, axes: Sequence[Axis], begin: Sequence[Reference]) -> CubicSpline:
+def curve(
+    points: Waypoints, axes: Sequence[Axis], begin: Sequence[Reference]
+) -> "scipy.interpolate.CubicSpline":
     """Return the strokes, (n,) m, over time, s, from the references where it begins to rest.
 
     axes: of all joints, each of which has to be named. Raises WaypointError.
@@ -89,10 +91,14 @@ def curve(points: Waypoints, axes: Sequence[Axis], begin: Sequence[Reference]) -
         velocities = None if velocities is None else velocities[1:]
     times, positions = np.r_[0.0, times], np.vstack((start, positions))
     if velocities is not None:
-        given: PPoly = CubicHermiteSpline(times, positions, np.vstack((rates, velocities)))
+        given: scipy.interpolate.PPoly = scipy.interpolate.CubicHermiteSpline(
+            times, positions, np.vstack((rates, velocities))
+        )
     else:
         rest = np.zeros(len(axes))
-        given = CubicSpline(times, positions, bc_type=((1, np.array(rates)), (1, rest)))
+        given = scipy.interpolate.CubicSpline(
+            times, positions, bc_type=((1, np.array(rates)), (1, rest))
+        )
     return _in_strokes(given, axes, begin)
 
 
@@ -132,7 +138,9 @@ def _rate(linkage: Linkage, now: Reference) -> float:
     return (ahead - linkage.angle(now.stroke - now.velocity * STEP)) / (2.0 * STEP)
 
 
-def _in_strokes(given: PPoly, axes: Sequence[Axis], begin: Sequence[Reference]) -> CubicSpline:
+def _in_strokes(
+    given: "scipy.interpolate.PPoly", axes: Sequence[Axis], begin: Sequence[Reference]
+) -> "scipy.interpolate.CubicSpline":
     end = float(given.x[-1])
     times = np.linspace(0.0, end, max(2, 1 + round(end / SPACING)))
     places = given(times)
@@ -144,7 +152,9 @@ def _in_strokes(given: PPoly, axes: Sequence[Axis], begin: Sequence[Reference]) 
             low, high = axis.linkage.angle(axis.low), axis.linkage.angle(axis.high)
             raise WaypointError(f"{axis.name} leaves its range, {low:.4g} ... {high:.4g}")
     first = np.array([now.velocity for now in begin])
-    found = CubicSpline(times, strokes, bc_type=((1, first), (1, np.zeros(len(axes)))))
+    found = scipy.interpolate.CubicSpline(
+        times, strokes, bc_type=((1, first), (1, np.zeros(len(axes))))
+    )
     fastest = np.abs(found(times, 1)).max(axis=0)
     for axis, speed in zip(axes, fastest, strict=True):
         if speed > axis.fastest:
@@ -186,7 +196,7 @@ class Along(Motion):
 class Followed(Motion):
     """The curve of one piston. curve: strokes, (1,) m."""
 
-    curve: CubicSpline
+    curve: "scipy.interpolate.CubicSpline"
     way: Motion
 
     @property

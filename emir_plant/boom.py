@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from emir_plant.parameters import GRAVITY, Geometry
 
@@ -94,7 +94,7 @@ def boom_modes(geometry: Geometry) -> BoomModes:
     kept = geometry.modes_kept
     if kept > len(model.weight):
         raise ValueError(f"modes_kept = {kept}: the boom has only {len(model.weight)} modes")
-    squares, shapes = eigh(model.stiffness, model.mass)
+    squares, shapes = scipy.linalg.eigh(model.stiffness, model.mass)
     shapes = shapes * np.sign(model.tip @ shapes)  # up positive
     line = np.zeros_like(model.tip)
     line[0] = model.tip.sum()

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from emir_plant import core
 from emir_plant.core import Array
@@ -85,7 +85,7 @@ def _solution(
     others = [0.0] * (len(still) - 2)
     for pressure in GUESSES:
         try:
-            found = root(rates, [pressure, guess, *others])
+            found = scipy.optimize.root(rates, [pressure, guess, *others])
         except SimulationError:  # on the way to a pressure that the cylinder cannot have
             continue
         if found.success and found.x[0] >= 0.0:

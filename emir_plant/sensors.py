@@ -8,9 +8,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
-from scipy.signal import lfilter
 
 from emir_plant import core, linkage
 from emir_plant.core import Array, Truth
@@ -155,7 +154,9 @@ def _delayed(signal: Array, dead: float, period: float) -> Array:
     if dead == 0.0:
         return signal
     time = np.arange(signal.size) * period
-    return np.asarray(make_interp_spline(time, signal)(np.maximum(time - dead, 0.0)))
+    return np.asarray(
+        scipy.interpolate.make_interp_spline(time, signal)(np.maximum(time - dead, 0.0))
+    )
 
 
 def _lagged(signal: Array, lag: float, period: float) -> Array:
@@ -166,7 +167,7 @@ def _lagged(signal: Array, lag: float, period: float) -> Array:
     decay = math.exp(-ratio)
     mean = -math.expm1(-ratio) / ratio  # of the decay over a period
     start = (mean - decay) * signal[0] + decay * signal[0]
-    shown, _ = lfilter([1.0 - mean, mean - decay], [1.0, -decay], signal, zi=[start])
+    shown, _ = scipy.signal.lfilter([1.0 - mean, mean - decay], [1.0, -decay], signal, zi=[start])
     return np.asarray(shown)
 
 

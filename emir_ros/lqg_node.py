@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import ClassVar
 
+import scipy.optimize  # noqa: F401 - loaded here, not when the first move is planned
+
 from emir_analysis.control_protocols import Signals
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import LqgControl

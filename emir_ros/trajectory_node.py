@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy.interpolate  # noqa: F401 - loaded here, not when the first order comes
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 

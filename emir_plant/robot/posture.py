@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from emir_plant.robot import kinematics
 from emir_plant.robot.dynamics import Mechanics
@@ -104,7 +104,7 @@ def modes(mechanics: Mechanics, q: Array, springs: Array, *, weight: bool = True
     if weight:
         stiffness += weight_stiffness(mechanics, q)
     block = np.ix_(free, free)
-    squares, shapes = eigh(stiffness[block], mechanics.mass(q)[block])
+    squares, shapes = scipy.linalg.eigh(stiffness[block], mechanics.mass(q)[block])
     whole = np.zeros((q.size, free.size))
     whole[free] = shapes
     return Modes(np.sqrt(np.clip(squares, 0.0, None)) / (2.0 * math.pi), whole)

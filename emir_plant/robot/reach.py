@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from emir_common.quantity import ParameterError, quantities
 from emir_plant.robot import linkage
@@ -111,7 +111,9 @@ def _roots(function: Callable[[float, Any], float], p: Any) -> list[float]:
     angles = np.linspace(-math.pi, math.pi, 722)[1:]
     values = np.array([function(a, p) for a in angles])
     changes = np.flatnonzero(values[1:] * values[:-1] < 0.0)  # nan where the loop is open
-    return [float(brentq(function, angles[k], angles[k + 1], args=(p,))) for k in changes]
+    return [
+        float(scipy.optimize.brentq(function, angles[k], angles[k + 1], args=(p,))) for k in changes
+    ]
 
 
 def _lever_in_line_with_cylinder(angle: float, p: Any) -> float:

@@ -5,8 +5,8 @@ boom's plane, with the weight's and the linkage's change with alpha_1 added.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from emir_plant.robot import linkage
 from emir_plant.robot.dynamics import Mechanics
@@ -28,7 +28,7 @@ def joint_mechanics(mechanics: Mechanics, joints: Array, kept: int = 5) -> Joint
     q, t = held.coordinates, mechanics.topology
     free = np.setdiff1d(np.arange(q.size), np.delete(t.joints, 1))
     block = np.ix_(free, free)
-    squares, shapes = eigh(mechanics.stiffness[block], mechanics.mass(q)[block])
+    squares, shapes = scipy.linalg.eigh(mechanics.stiffness[block], mechanics.mass(q)[block])
     whole = np.zeros((q.size, free.size))
     whole[free] = shapes
     joint = whole[t.joints[1]]

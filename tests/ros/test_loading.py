@@ -1,0 +1,40 @@
+"""What a node's module loads: parts of SciPy take up to a second each, so those it needs alone."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import emir_ros
+
+PLANNERS = {"trajectory_node": "interpolate", "lqg_node": "optimize", "mpc_node": "optimize"}
+NODES = {path.stem for path in Path(emir_ros.__file__).parent.glob("*_node.py")}
+LOAD = """
+import sys
+from importlib import import_module
+
+for name in sys.argv[1:]:
+    import_module(f"emir_ros.{name}")
+parts = {name.split(".")[1] for name in sys.modules if name.startswith("scipy.")}
+print(*sorted(part for part in parts if not part.startswith("_") and part != "version"))
+"""
+
+
+def _parts_of_scipy(nodes: list[str]) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", LOAD, *nodes], capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+def test_no_part_of_scipy_is_loaded_before_it_is_needed() -> None:
+    others = sorted(NODES - PLANNERS.keys())
+    assert len(others) > len(PLANNERS)
+    assert _parts_of_scipy(others) == []
+
+
+@pytest.mark.parametrize("node", PLANNERS)
+def test_what_plans_while_the_machine_moves_is_loaded_by_then(node: str) -> None:
+    """Loading it within a control period would leave the machine without commands for many."""
+    assert PLANNERS[node] in _parts_of_scipy([node])

@@ -23,12 +23,12 @@ from scipy.signal import savgol_filter
 from emir_analysis.diagnosis.experiment import (
     ANGLE,
     COMMAND,
-    COMMAND_STEP,
     OUTPUTS,
     STROKE,
+    SUBSTEP,
     Experiment,
 )
-from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, coarse_step, free_runs
+from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, free_runs, stable_step
 from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.diagnosis.noise_colour import coloured, colours
 from emir_analysis.errors import InputError
@@ -69,6 +69,7 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 WINDOW_STEP = 0.25  # s, from one window to the next
+INTEGRATION_STEP = 5e-3  # s: errs by a twentieth of the noise, and a run is to follow hundreds
 NOISE_DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
 
 
@@ -167,7 +168,7 @@ class Balances:
         """
         result = np.full((self._experiment.angle.size - 1, len(OUTPUTS)), np.nan)
         true = self._undistorted(machine)
-        for _, modelled in self._modelled([Plant(machine)], true[None], angle=SMOOTHED):
+        for _, modelled in self._modelled([Plant(machine)], true[None], SMOOTHED, SUBSTEP):
             moved = self.velocity[:-1] * self._experiment.period
             result[:, 0] = np.diff(self._experiment.outputs[:, 0]) - moved
             result[:, 1] = np.diff(true[:, 1]) - np.diff(modelled.pressure_lifting)
@@ -206,7 +207,11 @@ class Balances:
         return np.asarray(np.interp(time + dead, time, signal))
 
     def _modelled(
-        self, plants: Sequence[Plant], true: Array, angle: int = READ
+        self,
+        plants: Sequence[Plant],
+        true: Array,
+        angle: int = READ,
+        longest: float = INTEGRATION_STEP,
     ) -> list[tuple[int, Modelled]]:
         experiment = self._experiment
         starts = {}
@@ -221,11 +226,11 @@ class Balances:
         if not starts:
             return []
         able = list(starts)
-        stride = experiment.stride(coarse_step(plants))
+        commands, step = experiment.mean_commands(min(longest, stable_step(plants)))
         followed = follow(
             np.array(list(starts.values())),
-            experiment.commands[::stride],
-            COMMAND_STEP * stride,
+            commands,
+            step,
             np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
             _by_velocity([plants[k].record for k in able]),
         )

@@ -113,6 +113,18 @@ class Experiment:
         fitting = (n for n in range(1, self.every_row + 1) if self.every_row % n == 0)
         return max(n for n in fitting if n == 1 or n * COMMAND_STEP <= longest)
 
+    def mean_commands(self, longest: float) -> tuple[Array, float]:
+        """Return the mean command over each of equal steps, (m,), and their length, s.
+
+        They are as long as, within `longest`, s, some of them make a sample's period.
+        """
+        steps = math.ceil(self.period / longest - ROUNDING)
+        step = self.period / steps
+        integral = np.append(0.0, np.cumsum(self.commands)) * COMMAND_STEP
+        time = step * np.arange(self.commands.size // self.every * steps + 1)
+        reached = np.interp(time, COMMAND_STEP * np.arange(integral.size), integral)
+        return np.diff(reached) / step, step
+
     def head(self, share: float) -> "Experiment":
         """Return the first part of the recording."""
         return self.until(share * self.period * (self.angle.size - 1))

@@ -67,7 +67,7 @@ demo: install
 
 # On all cores, up to four; each file's tests in one process, since they share what takes long to make.
 test: install
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 lint: install
 	$(BIN)/python -m ruff check .

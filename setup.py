@@ -66,7 +66,7 @@ setup(
             "playwright>=1.40",
             "pytest>=8.2",
             "pytest-timeout>=2.3",
-            "pytest-xdist>=3.6",
+            "pytest-xdist>=3.8",
             "rosbags>=0.10",
         ],
         # What `emir bench diagnosis` stands beside; these hold numpy back (an environment apart).

@@ -144,15 +144,16 @@ class Balances:
         found["time"] = ("s", experiment.time)
         return {name: (unit, self._mean(signal)) for name, (unit, signal) in found.items()}
 
-    def residuals(self, machines: Sequence[Machine]) -> Array:
+    def residuals(self, machines: Sequence[Machine], longest: float = INTEGRATION_STEP) -> Array:
         """Return what is missing in each balance, (m, w, 5), SI units.
 
-        NaN for a machine that cannot rest at the recording's start.
+        NaN for a machine that cannot rest at the recording's start. longest: step of integration,
+        s; shorter where a machine is stable in shorter ones only.
         """
         plants = [Plant(machine) for machine in machines]
         true = np.array([self._undistorted(plant.machine) for plant in plants])
         result = np.full((len(plants), self.time.size, len(BALANCES)), np.nan)
-        for k, modelled in self._modelled(plants, true):
+        for k, modelled in self._modelled(plants, true, READ, longest):
             stroke = self._stroke(plants[k], true[k])
             off = self._true_stroke(plants[k].machine) - stroke
             result[k] = self._missing(modelled, true[k], off)
@@ -207,11 +208,7 @@ class Balances:
         return np.asarray(np.interp(time + dead, time, signal))
 
     def _modelled(
-        self,
-        plants: Sequence[Plant],
-        true: Array,
-        angle: int = READ,
-        longest: float = INTEGRATION_STEP,
+        self, plants: Sequence[Plant], true: Array, angle: int, longest: float
     ) -> list[tuple[int, Modelled]]:
         experiment = self._experiment
         starts = {}

@@ -111,6 +111,27 @@ def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
     assert found["bending"] < machine.sensors.deflection_noise
 
 
+def test_long_steps_of_integration_leave_the_balances_as_they_are(machine: Machine) -> None:
+    """Commands change inside a step of 5 ms, which takes the mean of them."""
+    balances, noise = residuals(machine, None)
+    exact = balances.residuals([machine], longest=1e-3)[0]
+    for name in ("force", "lifting_chamber", "lowering_chamber", "bending"):
+        assert 0.0 < rms(noise - exact)[name] < 0.05 * rms(exact)[name], name
+
+
+def test_the_mean_command_of_a_step_keeps_what_the_command_adds_up_to(machine: Machine) -> None:
+    truth = recorded.simulate(machine, recorded.moves(12.0, seed=5))
+    angle = Signal("joint_angle", *recorded.measured(machine, truth, seed=5)["joint_states"], "rad")
+    command = Signal("valve_command", np.array([0.0, 1.003, 2.5]), np.array([0.0, 0.4, -0.2]), "1")
+    run = experiment("run", Recording({"valve_command": command, "joint_angle": angle}, 0), machine)
+    means, step = run.mean_commands(4e-3)  # rows of 10 ms: three steps in each
+    assert step == pytest.approx(0.01 / 3.0)
+    total = np.cumsum(means) * step
+    time = step * np.arange(1, total.size + 1)
+    given = 0.4 * np.clip(time - 1.003, 0.0, 1.497) - 0.2 * np.maximum(time - 2.5, 0.0)
+    assert total == pytest.approx(given, abs=1e-9)
+
+
 def test_friction_shows_in_the_force_balance_and_leaves_the_chambers_quiet(
     machine: Machine,
 ) -> None:

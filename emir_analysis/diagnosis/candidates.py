@@ -328,12 +328,10 @@ def glimpsed(known: Trial, evidence: Evidence) -> Trial:
 def _whole_problem(known: Trial, evidence: Evidence) -> Problem:
     """Return the free run of whole recordings as a problem, begun where a trial is at rest.
 
-    Where no sensor tells p_S, the middle of what it may be at rest is too far off to begin at.
+    That is where its errors are told from. Begun elsewhere inside a step of the resolver, a fit may
+    stay there where something switches, and make up for it by parameters.
     """
-    rest = [
-        np.zeros(2) if Starts(e, evidence).is_told else settled(known.machine, e, evidence)
-        for e in evidence.experiments
-    ]
+    rest = [settled(known.machine, e, evidence) for e in evidence.experiments]
     return free_run_problem(known, evidence, np.concatenate([known.x, *rest]))
 
 

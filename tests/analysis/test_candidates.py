@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from operated import moved
 
-from emir_analysis.diagnosis.candidates import Trial, free_run_errors, trial, with_spread
+from emir_analysis.diagnosis.candidates import (
+    Trial,
+    free_run_errors,
+    mean_square,
+    refine_free_run,
+    trial,
+    with_spread,
+)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
@@ -52,3 +59,16 @@ def test_when_a_load_sets_in_at_once_is_told_wherever_in_a_step(start: float) ->
     off = [_apart(known, member.at(start + later), evidence) for later in (-0.02, 0.02)]
     spread = 0.02 / np.sqrt(np.mean(off))
     assert member.scale * known.spread[0] == pytest.approx(spread, rel=0.05)
+
+
+@pytest.mark.parametrize("off", [80e5, 88e5, 103e5])
+def test_a_fit_from_the_truth_leads_nowhere_worse(off: float) -> None:
+    """Where the logic block switches, with the boom at rest near the end of a resolver's step."""
+    stated, threshold = joint1(), "effects.logic_block_fault.threshold"
+    evidence = Evidence([moved(with_values(stated, {threshold: off}))], stated)
+    tolerances = {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03, "resistances.k_block_in": 0.1}
+    known = trial(Sheet(stated, tolerances, {}, ()), ("logic_block_fault",))
+    members = known.unknowns.members
+    x = [member.at(off) if member.path == threshold else 0.0 for member in members]
+    truth = known.at(np.array(x))
+    assert mean_square(refine_free_run(truth, evidence), evidence) <= mean_square(truth, evidence)

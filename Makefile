@@ -66,6 +66,7 @@ demo: install
 	@echo 'Figures    $(CURDIR)/$(OUT).json'
 
 # On all cores, up to four; each file's tests in one process, since they share what takes long to make.
+# In the order they stand: sorted by the number of tests, files with few but long ones would end last.
 test: install
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 

@@ -69,7 +69,7 @@ QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
 WINDOW_STEP = 0.25  # s, from one window to the next
-INTEGRATION_STEP = 5e-3  # s: errs by less than a twentieth of the noise, in hundreds of passes
+INTEGRATION_STEP = 5e-3  # s: errs by a twentieth of the noise or less; there are hundreds of passes
 NOISE_DRAWN = 240.0  # s of the sensors' noise, about, from which the floor is found
 
 

@@ -116,9 +116,9 @@ class Experiment:
     def mean_commands(self, longest: float) -> tuple[Array, float]:
         """Return the mean command over each of equal steps, (m,), and their length, s.
 
-        They are as long as, within `longest`, s, some of them make a sample's period.
+        A sample's period is as few of them as leave none longer than `longest`, s.
         """
-        steps = math.ceil(self.period / longest - ROUNDING)
+        steps = math.ceil((self.period - ROUNDING) / longest)
         step = self.period / steps
         integral = np.append(0.0, np.cumsum(self.commands)) * COMMAND_STEP
         time = step * np.arange(self.commands.size // self.every * steps + 1)

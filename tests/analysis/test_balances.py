@@ -113,10 +113,10 @@ def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
 
 def test_long_steps_of_integration_leave_the_balances_as_they_are(machine: Machine) -> None:
     """Commands change inside a step of 5 ms, which takes the mean of them."""
-    balances, noise = residuals(machine, None)
+    balances, found = residuals(machine, None)
     exact = balances.residuals([machine], longest=1e-3)[0]
     for name in ("force", "lifting_chamber", "lowering_chamber", "bending"):
-        assert 0.0 < rms(noise - exact)[name] < 0.05 * rms(exact)[name], name
+        assert 0.0 < rms(found - exact)[name] < 0.05 * rms(exact)[name], name
 
 
 def test_the_mean_command_of_a_step_keeps_what_the_command_adds_up_to(machine: Machine) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
 import emir_ros
 
 PLANNERS = {"trajectory_node": "interpolate", "lqg_node": "optimize", "mpc_node": "optimize"}

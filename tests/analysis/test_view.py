@@ -114,7 +114,7 @@ def address() -> Iterator[str]:
         assert found is not None, process.communicate()
         yield found.group()
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=120)
     assert process.returncode == 0
     assert "Traceback" not in errors
 

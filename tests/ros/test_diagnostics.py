@@ -46,7 +46,7 @@ class Graph:
 
     def until(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline, self.values
             self.executor.spin_once(timeout_sec=0.02)

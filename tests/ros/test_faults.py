@@ -44,7 +44,7 @@ SIGNALS = {
     "pressure_lifting": 1e7,
     "pressure_lowering": 2e6,
 }
-DEADLINE = 30.0  # s
+DEADLINE = 120.0  # s, on a busy computer
 
 
 class Bench:
@@ -241,7 +241,7 @@ def test_memory_stays_flat_in_lock_step(tmp_path: Path) -> None:
         try:
             used = []
             for size in (1_500_000, 6_000_000):
-                deadline = time.monotonic() + 4 * DEADLINE
+                deadline = time.monotonic() + DEADLINE
                 while not file.exists() or file.stat().st_size < size:
                     assert process.poll() is None
                     assert time.monotonic() < deadline

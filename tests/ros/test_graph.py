@@ -435,7 +435,7 @@ def test_a_killed_node_is_noticed_and_the_recording_stays_readable(
     with _started(words) as process:
         _wait_until(lambda: _size(bag / "run_0.mcap") > 300_000, process)
         os.kill(_child(process.pid, victim), signal.SIGKILL)
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=120)
     assert process.returncode == 1
     assert f"emir run: {victim} was killed by SIGKILL before the run was over" in errors
     assert "Traceback" not in errors
@@ -458,7 +458,7 @@ def test_an_interrupted_run_keeps_what_it_has(
     with _started(["--duration", "600", "--processes", processes, "--bag", str(bag)]) as process:
         _wait_until(lambda: _size(bag / "run_0.mcap") > 300_000, process)
         process.send_signal(number)
-        out, errors = process.communicate(timeout=60)
+        out, errors = process.communicate(timeout=120)
     assert process.returncode == 130
     assert errors.rstrip().endswith("emir run: interrupted")
     assert "tracking_error_rms" in out
@@ -698,7 +698,7 @@ def test_parameters_reach_the_nodes(tmp_path: Path) -> None:
 def test_plant_says_which_answer_it_waits_for(tmp_path: Path) -> None:
     words = ["--ros-args", "-p", "lockstep:=true", "-p", "patience:=0.5"]
     command = [sys.executable, "-m", "emir_ros.plant_node", *words]
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert finished.returncode == 1
     assert "plant_node: no valve_command for t = 0.000 s within 0.5 s" in finished.stderr
     assert "Traceback" not in finished.stderr
@@ -751,7 +751,7 @@ def _size(file: Path) -> int:
 
 
 def _wait_until(condition: object, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 120.0
     while not condition():  # type: ignore[operator]
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline, "the run does not get on"

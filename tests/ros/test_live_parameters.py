@@ -115,7 +115,7 @@ def test_a_change_is_recorded(tmp_path: Path) -> None:
         executor.add_node(node)
 
     def until(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline
             executor.spin_once(timeout_sec=0.01)

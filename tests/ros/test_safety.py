@@ -48,7 +48,6 @@ from emir_ros.shell import NodeError, Shell
 from emir_ros.trajectory_node import TrajectoryNode
 
 AT_ONCE = ["--ros-args", "-p", "delay:=0.2"]
-STANDBY = ["--ros-args", "-p", "standby:=true"]
 LOCKSTEP = ["--ros-args", "-p", "lockstep:=true"]
 INPUTS = (
     (VELOCITY_COMMAND, {"velocity_command": 0.02}),
@@ -114,7 +113,7 @@ class Graph:
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline, f"{what}; {self.listener.said}"
             self.executor.spin_once(timeout_sec=0.02)
@@ -231,18 +230,20 @@ def test_two_controllers_at_once_shut_the_valve_until_one_is_gone() -> None:
 
 
 def test_a_switch_by_parameter_while_it_moves_goes_without_a_jump() -> None:
-    chosen = ["--ros-args", "-p", "controllers:=[cascade, pfc]"]
+    """In lock step: on a busy computer the valve may shut in real time, which is a jump."""
+    ready = [*LOCKSTEP, "-p", "standby:=true"]
+    chosen = [*LOCKSTEP, "-p", "controllers:=[cascade, pfc]"]
     with _graph(
-        PlantNode,
-        lambda: TrajectoryNode(AT_ONCE),
-        lambda: CascadeNode(STANDBY),
-        lambda: PfcNode(STANDBY),
+        lambda: TrajectoryNode([*LOCKSTEP, "-p", "delay:=0.2"]),
+        lambda: CascadeNode(ready),
+        lambda: PfcNode(ready),
         lambda: SelectorNode(chosen),
-        ForceLoopNode,
+        lambda: ForceLoopNode(LOCKSTEP),
+        lambda: PlantNode(LOCKSTEP),
+        lockstep=True,
     ) as graph:
-        selector = graph.nodes[5]
-        graph.until(_moves(graph), "the machine does not move")
-        graph.until(lambda: graph.listener.of(VELOCITY_COMMAND)[-1] > 0.02, "it is slow")
+        selector = graph.nodes[4]
+        graph.until(lambda: max(graph.listener.of(VELOCITY_COMMAND), default=0.0) > 0.02, "slow")
         (refused,) = selector.set_parameters([Parameter("controller", value="magic")])
         assert not refused.successful
         assert refused.reason == "selector_node: controller 'magic': running are cascade, pfc"
@@ -256,7 +257,7 @@ def test_a_switch_by_parameter_while_it_moves_goes_without_a_jump() -> None:
             ),
             "nothing is said",
         )
-        command = graph.listener.of(VELOCITY_COMMAND)[before - 2 : before + 3]
+        command = graph.listener.of(VELOCITY_COMMAND)[before - 2 :]
         assert min(command) > 0.015
         assert np.abs(np.diff(command)).max() < 0.006  # begun cold it falls by 0.02
 

@@ -54,7 +54,7 @@ def test_a_controller_lives_in_the_recordings_time() -> None:
         executor.add_node(node)
 
     def until(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline
             executor.spin_once(timeout_sec=0.01)

@@ -49,7 +49,7 @@ def test_the_graph_publishes_what_the_table_says(model: str, tmp_path: Path) -> 
         if name in names and topic.name not in OFFERED
     }
     try:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + 120.0
         found = _published(observer, names)
         while not wanted <= found and time.monotonic() < deadline:
             rclpy.spin_once(observer, timeout_sec=0.1)

@@ -77,7 +77,7 @@ class Bench(Node):
 
     def until(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline
             self._executor.spin_once(timeout_sec=0.01)

@@ -28,7 +28,7 @@ from emir_ros.view_node import SHOWN as LIVE
 
 SENT = [JOINT_STATES, CYLINDER_STATES, PRESSURE_LIFTING]
 SIGNALS = {"angle": 0.8, "stroke": 0.3, "force": 1e5, "pressure_lifting": 1.1e7}
-DEADLINE = 30.0  # s
+DEADLINE = 120.0  # s, on a busy computer
 
 
 @pytest.fixture

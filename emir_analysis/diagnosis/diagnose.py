@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, with_spread
 from emir_analysis.diagnosis.curves import Curve, curve
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.fitting import fit_balances, with_spread
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.misstated import misstated
@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limit
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.telling import open_shares
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.diagnosis.where import Where, where
 from emir_analysis.diagnosis.whole import Progress

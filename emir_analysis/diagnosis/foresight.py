@@ -9,13 +9,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, at_rest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.run_errors import at_rest
 from emir_analysis.diagnosis.select import EXPLAINED, excess
 from emir_analysis.diagnosis.stick_slip import DECIDED
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 

@@ -5,13 +5,14 @@ import math
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import DRY, Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.sheet import Sheet
 
+DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m

@@ -12,7 +12,6 @@ from itertools import product
 import numpy as np
 from scipy.optimize import least_squares
 
-from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import (
     DIFFERENCE_STEP,
@@ -21,6 +20,8 @@ from emir_analysis.diagnosis.fit import (
     steps_inside,
 )
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.run_errors import coarse_errors
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 
 SHAPES = {  # that are tried in all combinations

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis import black_box
-from emir_analysis.diagnosis.candidates import (
-    fit_balances,
-    fit_free_run,
-    free_run,
-    free_run_errors,
-)
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.run_errors import free_run, free_run_errors
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise, leaves_quiet
 from emir_analysis.root_mean_square import column_rms, rms
 from emir_analysis.signals import Array

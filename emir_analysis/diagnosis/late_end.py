@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import Trial, coarse_errors
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import mean_squares
+from emir_analysis.diagnosis.run_errors import coarse_errors
 from emir_analysis.diagnosis.screening import LOAD
+from emir_analysis.diagnosis.trial import Trial
 
 DURATION = f"effects.{LOAD}.duration"
 END_STEP = 0.5  # s, between the ends that are tried

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
@@ -25,6 +24,7 @@ from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, ver
 from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK, PERIODS
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import between_steps, untold
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.root_mean_square import column_rms

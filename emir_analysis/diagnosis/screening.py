@@ -15,14 +15,6 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import (
-    FREE_RUN_STEP,
-    Trial,
-    coarse_errors,
-    moved,
-    settled,
-    trial,
-)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import (
     DIFFERENCE_STEP,
@@ -32,7 +24,10 @@ from emir_analysis.diagnosis.fit import (
     fit,
     steps_inside,
 )
+from emir_analysis.diagnosis.fitting import FREE_RUN_STEP
 from emir_analysis.diagnosis.loads import FOR_EVER, Load, constant, likely, of_force, of_steps
+from emir_analysis.diagnosis.run_errors import coarse_errors, settled
+from emir_analysis.diagnosis.trial import Trial, moved, trial
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY

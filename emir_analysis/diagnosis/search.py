@@ -4,26 +4,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import (
-    HOPELESS,
-    Trial,
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import SHORTEST
+from emir_analysis.diagnosis.fitting import (
     fit_balances,
     fit_free_run,
     following,
-    free_run_errors,
     refine_free_run,
-    trial,
     with_fewer_terms,
 )
-from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.late_end import with_a_late_end
+from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
+    HOPELESS,
     LEFT,
     SEEN,
     STRONG,
@@ -37,6 +35,7 @@ from emir_analysis.diagnosis.select import (
     rivals,
 )
 from emir_analysis.diagnosis.stick_slip import OFF, begun, with_less_friction
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
 from emir_plant.effects import REGISTRY

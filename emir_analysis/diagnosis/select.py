@@ -4,8 +4,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from emir_analysis.diagnosis.balances import FORCE_WINDOW, level
-from emir_analysis.diagnosis.candidates import HOPELESS, Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -16,6 +17,7 @@ CHANCE = 1e-3  # with which noise alone may make a balance of a short recording 
 LEFT = 1.03  # times the sensor noise, all signals together: more, and a fit is gone on with
 AT_NOISE = 1.1  # times the sensor noise: free-run error of a model that lacks nothing
 EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model explains a signal
+HOPELESS = 5.0  # times the sensor noise, beyond which a model is not near the truth
 FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balance varies by chance
 CORRELATION_TIME = 1.0  # s: errors closer than this are not counted as independent
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.candidates import Trial, free_run_errors, mean_square
 from emir_analysis.diagnosis.curves import Curve, visited
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.drift import Drift
@@ -14,11 +13,13 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
+from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.where import LOCATED, Where
 from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import declared

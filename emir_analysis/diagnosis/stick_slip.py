@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE
-from emir_analysis.diagnosis.candidates import FREE_RUN_ACCURACY, Trial, free_run_problem, shapes
+from emir_analysis.diagnosis.effect_shapes import shapes
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
+from emir_analysis.diagnosis.fitting import free_run_problem
 from emir_analysis.diagnosis.friction_laws import (
     STRIBECK,
     VISCOUS,
@@ -28,7 +29,9 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
 )
 from emir_analysis.diagnosis.friction_starts import friction_starts
+from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY
 from emir_analysis.diagnosis.select import AT_NOISE, CORRELATION_TIME, LEFT, STRONG, score
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 from emir_plant.sheet import Sheet
 

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES
-from emir_analysis.diagnosis.candidates import Trial, glimpsed
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP
+from emir_analysis.diagnosis.fitting import glimpsed
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.select import EXPLAINED, STRONG, beyond, excess, free_run_score
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array

@@ -13,24 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, FORCE, FORCE_WINDOW, level
-from emir_analysis.diagnosis.candidates import (
-    FREE_RUN_ACCURACY,
-    GROWING,
-    HOPELESS,
-    Trial,
-    fit_balances,
-    free_run_problem,
-)
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import (
-    DIFFERENCE_STEP,
-    Problem,
-    fit,
-    steps_inside,
-)
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, fit, steps_inside
+from emir_analysis.diagnosis.fitting import GROWING, fit_balances, free_run_problem
+from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY
 from emir_analysis.diagnosis.select import (
     EXPLAINED,
+    HOPELESS,
     STRONG,
     beyond,
     excess,
@@ -40,6 +30,7 @@ from emir_analysis.diagnosis.select import (
     score,
 )
 from emir_analysis.diagnosis.straight import least
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values

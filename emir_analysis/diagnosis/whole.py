@@ -5,18 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidates import (
-    HOPELESS,
-    Trial,
-    free_run_errors,
-    glimpsed,
-    mean_square,
-    moved,
-    refine_free_run,
-    with_all_terms,
-    with_fewer_terms,
-)
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fitting import glimpsed, refine_free_run, with_fewer_terms
 from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
     along_the_way,
@@ -28,9 +18,19 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
     without_breakaway,
 )
+from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.screening import LOAD
-from emir_analysis.diagnosis.select import AT_NOISE, LEFT, STRONG, beyond, excess, free_run_score
+from emir_analysis.diagnosis.select import (
+    AT_NOISE,
+    HOPELESS,
+    LEFT,
+    STRONG,
+    beyond,
+    excess,
+    free_run_score,
+)
 from emir_analysis.diagnosis.stick_slip import Grown, follows_the_beginning, grown, grown_at_noise
+from emir_analysis.diagnosis.trial import Trial, moved, with_all_terms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from operated import moved, without
 
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, fit_free_run, trial
 from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS

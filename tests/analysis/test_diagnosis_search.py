@@ -13,21 +13,15 @@ from operated import moved, operated, without
 from emir_analysis.closed_loop import ClosedLoop
 from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
 from emir_analysis.diagnosis.black_box import train, train_one_step
-from emir_analysis.diagnosis.candidates import (
-    Trial,
-    at_rest,
-    fit_balances,
-    fit_free_run,
-    refine_free_run,
-    trial,
-)
 from emir_analysis.diagnosis.diagnose import diagnose, loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, refine_free_run
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
+from emir_analysis.diagnosis.run_errors import at_rest
 from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search, Tried
 from emir_analysis.diagnosis.select import (
@@ -42,6 +36,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.statement import closest, statement, verdict
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms

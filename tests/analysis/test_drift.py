@@ -7,10 +7,11 @@ import pytest
 import recorded
 from operated import moved, operated
 
-from emir_analysis.diagnosis.candidates import fit_balances, trial
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.fitting import fit_balances
+from emir_analysis.diagnosis.trial import trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from operated import operated, without
 
-from emir_analysis.diagnosis.candidates import following, trial
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fitting import following
+from emir_analysis.diagnosis.trial import trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

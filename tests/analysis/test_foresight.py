@@ -5,10 +5,10 @@ import recorded
 from operated import operated
 from test_diagnosis_search import TOLERANCES
 
-from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.foresight import explained, parting
 from emir_analysis.diagnosis.select import EXPLAINED, excess
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

@@ -3,11 +3,11 @@
 import pytest
 from operated import moved
 
-from emir_analysis.diagnosis.candidates import Trial, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.late_end import with_a_late_end
 from emir_analysis.diagnosis.loads import FOR_EVER
 from emir_analysis.diagnosis.select import SEEN
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from operated import moved
 
-from emir_analysis.diagnosis.candidates import Trial, fit_balances, trial
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, fit
+from emir_analysis.diagnosis.fitting import fit_balances
 from emir_analysis.diagnosis.screening import OnBalances, _Left
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values

@@ -9,17 +9,12 @@ from operated import operated
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import stick_slip
-from emir_analysis.diagnosis.candidates import (
-    Trial,
-    fit_balances,
-    fit_free_run,
-    free_run_errors,
-    trial,
-)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.friction_laws import fullest, is_along_the_way, is_gradual, nested
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
+from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import at_noise
 from emir_analysis.diagnosis.stick_slip import (
     FIRST,
@@ -29,6 +24,7 @@ from emir_analysis.diagnosis.stick_slip import (
     grown,
     with_less_friction,
 )
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1

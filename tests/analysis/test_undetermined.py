@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from operated import moved, operated
 
-from emir_analysis.diagnosis.candidates import Trial, trial, with_spread
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fitting import with_spread
 from emir_analysis.diagnosis.result import OPEN, SET, effect_results, parameter_line
 from emir_analysis.diagnosis.telling import between_steps, open_shares
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

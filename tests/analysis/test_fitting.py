@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from operated import moved
 
-from emir_analysis.diagnosis.candidates import (
-    Trial,
-    free_run_errors,
-    mean_square,
-    refine_free_run,
-    trial,
-    with_spread,
-)
 from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fitting import refine_free_run, with_spread
+from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
+from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 

@@ -1,23 +1,19 @@
 """Which effects explain the recordings: what is tried, in which order, and what is kept."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fitting import (
     fit_balances,
     fit_free_run,
     following,
     refine_free_run,
-    with_fewer_terms,
 )
-from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
-from emir_analysis.diagnosis.late_end import with_a_late_end
+from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
-from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
@@ -25,9 +21,7 @@ from emir_analysis.diagnosis.select import (
     LEFT,
     SEEN,
     STRONG,
-    astray,
     at_noise,
-    balance_score,
     beyond,
     excess,
     free_run_score,
@@ -38,28 +32,11 @@ from emir_analysis.diagnosis.stick_slip import OFF, begun, with_less_friction
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
-from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 MOST_EFFECTS = 3  # that are looked for in one machine
 MOST_BESIDE_ENOUGH = 2  # the same where fewer suffice, but more than the noise is left
-MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
-MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 MOST_OTHERS = 2  # effects beside which is looked where nothing beside the best one suffices
-PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
-CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A trial and its scores on the balances and on the unseen free run; smaller is better.
-
-    free_run: None where the balances already spoke against it.
-    """
-
-    trial: Trial
-    balances: float
-    free_run: float | None = None
 
 
 class Search:
@@ -68,8 +45,7 @@ class Search:
     Effects are added one at a time, as long as the unseen free run gets better; then those go
     without which the whole is explained as well.
 
-    tried: all trials. balanced, refitted: the parameters alone, fitted to the balances and to the
-    free run of the whole recordings.
+    balanced, refitted: the parameters alone, fitted to the balances and to the whole free run.
     """
 
     def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
@@ -79,30 +55,34 @@ class Search:
         progress("parameters only")
         self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
         self.refitted = fit_free_run(self.balanced, evidence)
-        self.tried: list[Tried] = []
         self.whole = Whole(evidence, sheet, self.floor, progress)
-        self._rounds: dict[tuple[str, ...], list[Trial]] = {}  # the best of each, by effects
+        self._rounds = Rounds(evidence, sheet, self.floor, self.whole, progress)
+        self._equal: dict[tuple[str, ...], list[Trial]] = {}  # the best of each round, by effects
         self._settled: tuple[str, ...] = ()  # effects that are known to be needed
         self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
-        self._beside_none: OnBalances | None = None
+
+    @property
+    def tried(self) -> list[Tried]:
+        """All trials."""
+        return self._rounds.tried
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
         errors = free_run_errors(self.refitted.machine, self._evidence)
         left = column_rms(np.concatenate(errors))  # NaN where there is no free run
-        if np.all(left <= AT_NOISE) and self._quiet(self.balanced):
-            self.tried = [self._scored(self.balanced)]
+        if np.all(left <= AT_NOISE) and leaves_quiet(self.balanced, self._evidence):
+            self._rounds.tried = [self._rounds.scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
-        plain = self._scored(self._plain(), free_run_score(self.refitted, self._evidence))
-        self.tried = [plain]
+        plain = self._rounds.scored(self._plain(), free_run_score(self.refitted, self._evidence))
+        self._rounds.tried = [plain]
         best, equal, enough = self._one_at_a_time(plain)
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
-            enough = self._enough(best.trial)
+            enough = self._rounds.enough(best.trial)
         if not enough:
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
-        return equal if needed is equal[0] else self._rounds.get(needed.effects, [needed])
+        return equal if needed is equal[0] else self._equal.get(needed.effects, [needed])
 
     def _plain(self) -> Trial:
         """Return the parameters alone as effects are looked for beside them.
@@ -120,18 +100,18 @@ class Search:
         Return the best trial, those that are as good and whether an effect has made it suffice.
         """
         best, equal, enough = plain, [plain.trial], False
-        self._rounds = {plain.trial.effects: equal}
+        self._equal = {plain.trial.effects: equal}
         while len(best.trial.effects) < MOST_EFFECTS:
             self._progress(f"all effects beside: {best.trial.name}")
-            better = self._beside_enough(best) if enough else self._beside(best)
+            better = self._rounds.beside_enough(best) if enough else self._rounds.beside(best)
             if not better:
                 break
             equal = self.simplest(_as_good(better), better)
-            self._rounds[equal[0].effects] = equal
+            self._equal[equal[0].effects] = equal
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             if sticks(best.trial) and self._excess(best.trial) < beyond(HOPELESS):
                 equal, best = self._by_beginning(equal, best)
-            enough = self._enough(best.trial)
+            enough = self._rounds.enough(best.trial)
             many = len(best.trial.effects) >= MOST_BESIDE_ENOUGH
             if enough and (many or self._excess(best.trial) <= beyond(LEFT)):
                 break
@@ -146,7 +126,7 @@ class Search:
         if others or not np.any(self._evidence.fitted):
             return others
         self._progress("pairs of effects")
-        better = self._by_balances(self._pairs(plain, best), best)
+        better = self._rounds.pairs(plain, best)
         if not better:
             return []
         equal = _as_good(better)
@@ -163,16 +143,16 @@ class Search:
         first, then those that are ahead in the free run.
         """
         singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
-        singles = sorted(singles, key=lambda t: t.balances)[:1] + sorted(singles, key=_free)
+        singles = sorted(singles, key=lambda t: t.balances)[:1] + sorted(singles, key=free)
         others: dict[tuple[str, ...], Tried] = {}
         for single in singles:
             if single.trial.effects != best.trial.effects[:1]:
                 others.setdefault(single.trial.effects, single)
         for other in list(others.values())[:MOST_OTHERS]:
             self._progress(f"all effects beside: {other.trial.name}")
-            better = self._beside(other)
+            better = self._rounds.beside(other)
             found = _as_good(better) if better else []
-            if found and self._enough(self.whole.fitted(found[0])):
+            if found and self._rounds.enough(self.whole.fitted(found[0])):
                 return found
         return []
 
@@ -193,7 +173,7 @@ class Search:
 
     def needed(self, chosen: Trial) -> Trial:
         """Return a trial without the effect that is least needed, if one is not."""
-        if not chosen.effects or not self._enough(self.whole.fitted(chosen)):
+        if not chosen.effects or not self._rounds.enough(self.whole.fitted(chosen)):
             return chosen
         full = self.whole.fitted(chosen)
         least = self.whole.score(full) + STRONG
@@ -206,7 +186,7 @@ class Search:
                 continue
             self._progress(f"fitting without: {effect}")
             fitted = self.whole.better(refine_free_run(fewer, self._evidence, full))
-            if self.whole.score(fitted) < least and self._enough(fitted):
+            if self.whole.score(fitted) < least and self._rounds.enough(fitted):
                 enough.append(fitted)
         if not enough:
             return chosen
@@ -254,8 +234,8 @@ class Search:
             return equal, best
         self.whole.keep(found)
         self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
-        told = self._scored(found, free_run_score(found, self._evidence))
-        self.tried.append(told)
+        told = self._rounds.scored(found, free_run_score(found, self._evidence))
+        self._rounds.tried.append(told)
         return [found], told
 
     def _with_friction(self, known: Trial, most: float) -> Trial | None:
@@ -276,214 +256,8 @@ class Search:
             return None
         return self.whole.with_friction(law, fuller, known)
 
-    def _pairs(self, plain: Tried, best: Tried) -> list[Screened]:
-        """Return pairs of effects, the most promising first.
-
-        All to first order, and all beside the one effect that says most to the balances: the
-        free run may be none the better for it while another effect drives it away.
-        """
-        found = self._on_balances(plain.trial).pairs()
-        singles = [t for t in self.tried if len(t.trial.effects) == 1]
-        first = min(singles, key=lambda t: t.balances, default=best)
-        if first.trial.effects != best.trial.effects:
-            told = fit_balances(first.trial, self._head, self.floor)
-            found += self._on_balances(told).singles()
-        return sorted(found, key=lambda s: s.cost)
-
-    def _on_balances(self, known: Trial) -> OnBalances:
-        """Return each effect begun beside a trial; beside none they are asked for twice."""
-        if not known.effects and self._beside_none is not None:
-            return self._beside_none
-        begun = OnBalances(known, self._sheet, self._head, self.floor)
-        if not known.effects:
-            self._beside_none = begun
-        return begun
-
-    def _beside(self, best: Tried) -> list[Tried]:
-        """Return what is better with one effect more.
-
-        Where missing sensors leave balances out, what those would show is in the free run alone:
-        that is asked too where the others lead nowhere near, and where they are quiet: what acts
-        in a few windows only, or hardly more than their noise, does not tell there which it is.
-        """
-        better = []
-        if np.any(self._evidence.fitted):
-            found = self._on_balances(best.trial).singles()
-            better = self._by_balances(found, best)
-            near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
-            told = near or self._evidence.complete
-            if told and not self._quiet(best.trial):
-                return better
-        known = [t.trial.effects for t in better]
-        others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
-        better += self._better(others, best)
-        return better or self._in_held_back(best)
-
-    def _in_held_back(self, best: Tried) -> list[Tried]:
-        """Return what suffices with one effect more that acts in the part held back alone.
-
-        The part that the fits see is explained without, so that nothing there asks for it.
-        """
-        unexplained = beyond(EXPLAINED)
-        if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
-            return []
-        near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
-        limit = (1.0 - PROMISING) * excess(best.trial, near)
-        found = []
-        for screened in screen_free_run(best.trial, self._sheet, near)[:MOST_SIMULATED]:
-            if excess(screened.trial, near) < limit:
-                fitted = self.whole.fitted(screened.trial)
-                if self._suffices(fitted, best.trial):
-                    found.append(self._scored(fitted, free_run_score(fitted, self._evidence)))
-        self.tried += found
-        return found
-
-    def _beside_enough(self, best: Tried) -> list[Tried]:
-        """Return the same beside a trial that is good enough: what takes away most of the rest.
-
-        The balances are quiet then; the free run alone may know more. Beside what sticks, where a
-        fit takes longest, only what takes a part away before it is fitted.
-        """
-        least = 0.5 * self._excess(best.trial)
-        promising = self._on_free_run(best)
-        if sticks(best.trial):
-            limit = (1.0 - PROMISING) * excess(best.trial, self._head)
-            promising = [t for t in promising if excess(t.trial, self._head) < limit]
-        better = self._better(promising, best)
-        close = min(map(_free, better), default=0.0) + STRONG
-        better = [t for t in better if _free(t) < close]
-        return [t for t in better if self._excess(self.whole.fitted(t.trial)) < least]
-
-    def _on_free_run(self, best: Tried) -> list[Tried]:
-        """Return the trials with one effect more that promise most on the free run.
-
-        Where it has long gone astray no first-order step says anything.
-        """
-        near = self._head.until(astray(best.trial, self._head) + SHORTEST)
-        found = screen_free_run(best.trial, self._sheet, near)
-        return [self._scored(self._led(s.trial, best)) for s in found[:MOST_SIMULATED]]
-
-    def _led(self, begun: Trial, best: Tried) -> Trial:
-        """Return a trial as it was begun on the free run, or as the balances have it, if better.
-
-        To first order play that opens seldom is far too small: it explains nothing until the
-        piston crosses it at the right instants.
-        """
-        if not self._evidence.complete:
-            return begun
-        start = trial(self._sheet, begun.effects, best.trial)
-        balanced = fit_balances(start, self._head, self.floor)
-        return min(begun, balanced, key=lambda t: excess(t, self._head))
-
-    def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
-        """Fit trials to the balances, those that come close to the best of them to the free run.
-
-        Return what is better. Where none is, the one that is ahead in the free run already.
-        """
-        known = {frozenset(tried.trial.effects) for tried in self.tried}
-        new = []
-        for screened in found:
-            if frozenset(screened.trial.effects) not in known:
-                known.add(frozenset(screened.trial.effects))
-                new.append(screened.trial)
-        round_ = []
-        for trial_ in new[:MOST_FITTED]:
-            self._progress(f"balances: {trial_.name}")
-            round_.append(self._scored(fit_balances(trial_, self._head, self.floor)))
-        least = min((t.balances for t in round_), default=np.inf)
-        limit = min(best.balances - STRONG, least + CLOSE)
-        close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
-        promising = close[:MOST_SIMULATED]
-        others = [t for t in round_ if t not in promising]
-        better = self._better(promising, best)
-        if not better:
-            ahead = self._ahead(others, best)
-            others = [t for t in others if t not in ahead]
-            better = self._better(ahead, best)
-        self.tried += others
-        return better
-
-    def _ahead(self, others: list[Tried], best: Tried) -> list[Tried]:
-        """Return the trial whose free run is best, if it is better than the best so far.
-
-        Though it is fitted to the balances alone: a free run adds up what they hardly know of,
-        such as a small leak.
-        """
-        least, ahead = _free(best) - STRONG, []
-        for tried in others:
-            score = free_run_score(tried.trial, self._evidence)
-            if score < least:
-                least, ahead = score, [tried]
-        return ahead
-
-    def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
-        """Fit trials to the free run; return those that are better than the best so far."""
-        simulated = []
-        for tried in promising:
-            self._progress(f"free run: {tried.trial.name}")
-            simulated.append(self._simulated(tried))
-        self.tried += simulated
-        better = [t for t in simulated if _free(t) < _free(best) - STRONG]
-        better = better or [t for t in simulated if self._suffices(t.trial, best.trial)]
-        return better or self._late(simulated, best)
-
-    def _late(self, simulated: list[Tried], best: Tried) -> list[Tried]:
-        """Return the trial nearest to the whole recordings, fitted to them, if that suffices.
-
-        What acts in the part held back alone, as play that opens there, no fit has seen. One that
-        is no nearer than the best so far is not fitted: that takes long.
-        """
-        limit = self.whole.score(best.trial) - STRONG
-        nearest = min(simulated, key=lambda t: self.whole.score(t.trial), default=None)
-        if nearest is None or self.whole.score(nearest.trial) >= limit:
-            return []
-        fitted = replace(nearest, trial=self.whole.fitted(nearest.trial))
-        return [fitted] if self._suffices(fitted.trial, best.trial) else []
-
-    def _simulated(self, tried: Tried) -> Tried:
-        """Return a trial fitted to the free run.
-
-        Of several sizes of an effect one alone is taken where the others are not worth their while.
-        A load may have ended since. Where all that leads nowhere near, what else is missing drives
-        the free run away and the parameters with it: they stay as the balances say, if those are
-        all told. Nor do fewer terms of a series lead anywhere then.
-        """
-        full = fit_free_run(tried.trial, self._head)
-        hopeless = excess(full, self._head) > beyond(HOPELESS)
-        if self._evidence.complete and hopeless:
-            return replace(tried, free_run=free_run_score(full, self._evidence))
-        ways = [full]
-        for effect in full.effects:
-            if REGISTRY[effect].is_series:
-                ways += [] if hopeless else with_fewer_terms(full, effect, self._head)
-            else:
-                ways += full.with_each_size(effect)
-        if LOAD in full.effects:
-            ways += [with_a_late_end(way, self._evidence, SEEN) for way in ways]
-        scores = [free_run_score(way, self._evidence) for way in ways]
-        best_way = int(np.argmin(scores))
-        return Tried(ways[best_way], tried.balances, scores[best_way])
-
-    def _suffices(self, tried: Trial, best: Trial) -> bool:
-        """Tell whether the whole recordings need no more than a trial, and that far more than best.
-
-        For recordings too short for a part held back to tell: nothing may move in it.
-        """
-        better = self.whole.score(tried) < self.whole.score(best) - STRONG
-        return better and not self._enough(best) and self._enough(tried)
-
-    def _enough(self, tried: Trial) -> bool:
-        """Tell whether a trial leaves no balance speaking and explains the free run."""
-        return self._quiet(tried) and explained(tried, self._evidence)
-
-    def _quiet(self, tried: Trial) -> bool:
-        return leaves_quiet(tried, self._evidence)
-
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)
-
-    def _scored(self, tried: Trial, free_run: float | None = None) -> Tried:
-        return Tried(tried, balance_score(tried, self._evidence, self.floor), free_run)
 
 
 def _as_good(better: list[Tried]) -> list[Trial]:
@@ -492,11 +266,7 @@ def _as_good(better: list[Tried]) -> list[Trial]:
     Of two of which one is the other without a break-away the one with fewer parameters: it would
     be as good whatever the recordings are.
     """
-    equal = rivals([t.trial for t in better], [_free(t) for t in better])
+    equal = rivals([t.trial for t in better], [free(t) for t in better])
     best = next((less for less in equal[1:] if nested(equal[0], less)), equal[0])
     others = [t for t in equal[1:] if t is not best and t.x.size <= best.x.size]
     return [best, *others]
-
-
-def _free(tried: Tried) -> float:
-    return float("inf") if tried.free_run is None else tried.free_run

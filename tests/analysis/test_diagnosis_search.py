@@ -21,9 +21,10 @@ from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
+from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.run_errors import at_rest
 from emir_analysis.diagnosis.screening import OnBalances
-from emir_analysis.diagnosis.search import Search, Tried
+from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import (
     SEEN,
     STRONG,

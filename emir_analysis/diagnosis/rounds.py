@@ -1,0 +1,282 @@
+"""One round of a search: which trials with an effect more are better than the best so far."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.experiment import SHORTEST
+from emir_analysis.diagnosis.fitting import (
+    fit_balances,
+    fit_free_run,
+    with_fewer_terms,
+)
+from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.late_end import with_a_late_end
+from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
+from emir_analysis.diagnosis.select import (
+    EXPLAINED,
+    HOPELESS,
+    SEEN,
+    STRONG,
+    astray,
+    balance_score,
+    beyond,
+    excess,
+    free_run_score,
+    leaves_quiet,
+)
+from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.whole import Progress, Whole
+from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
+from emir_plant.sheet import Sheet
+
+MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
+MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
+PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
+CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A trial and its scores on the balances and on the unseen free run; smaller is better.
+
+    free_run: None where the balances already spoke against it.
+    """
+
+    trial: Trial
+    balances: float
+    free_run: float | None = None
+
+
+class Rounds:
+    """What is tried beside a trial: fitted to the balances, what comes close to the free run.
+
+    tried: all trials.
+    """
+
+    def __init__(
+        self, evidence: Evidence, sheet: Sheet, floor: Array, whole: Whole, progress: Progress
+    ) -> None:
+        self._evidence, self._sheet, self._floor = evidence, sheet, floor
+        self._whole, self._progress = whole, progress
+        self._head = evidence.head(SEEN)
+        self.tried: list[Tried] = []
+        self._beside_none: OnBalances | None = None
+
+    def beside(self, best: Tried) -> list[Tried]:
+        """Return what is better with one effect more.
+
+        Where missing sensors leave balances out, what those would show is in the free run alone:
+        that is asked too where the others lead nowhere near, and where they are quiet: what acts
+        in a few windows only, or hardly more than their noise, does not tell there which it is.
+        """
+        better = []
+        if np.any(self._evidence.fitted):
+            found = self._on_balances(best.trial).singles()
+            better = self._by_balances(found, best)
+            near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
+            told = near or self._evidence.complete
+            if told and not self._quiet(best.trial):
+                return better
+        known = [t.trial.effects for t in better]
+        others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
+        better += self._better(others, best)
+        return better or self._in_held_back(best)
+
+    def beside_enough(self, best: Tried) -> list[Tried]:
+        """Return the same beside a trial that is good enough: what takes away most of the rest.
+
+        The balances are quiet then; the free run alone may know more. Beside what sticks, where a
+        fit takes longest, only what takes a part away before it is fitted.
+        """
+        least = 0.5 * self._excess(best.trial)
+        promising = self._on_free_run(best)
+        if sticks(best.trial):
+            limit = (1.0 - PROMISING) * excess(best.trial, self._head)
+            promising = [t for t in promising if excess(t.trial, self._head) < limit]
+        better = self._better(promising, best)
+        close = min(map(free, better), default=0.0) + STRONG
+        better = [t for t in better if free(t) < close]
+        return [t for t in better if self._excess(self._whole.fitted(t.trial)) < least]
+
+    def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
+        """Return what is better than the best so far with two effects beside parameters alone.
+
+        All to first order, and all beside the one effect that says most to the balances: the
+        free run may be none the better for it while another effect drives it away.
+        """
+        found = self._on_balances(plain.trial).pairs()
+        singles = [t for t in self.tried if len(t.trial.effects) == 1]
+        first = min(singles, key=lambda t: t.balances, default=best)
+        if first.trial.effects != best.trial.effects:
+            told = fit_balances(first.trial, self._head, self._floor)
+            found += self._on_balances(told).singles()
+        return self._by_balances(sorted(found, key=lambda s: s.cost), best)
+
+    def enough(self, tried: Trial) -> bool:
+        """Tell whether a trial leaves no balance speaking and explains the free run."""
+        return self._quiet(tried) and explained(tried, self._evidence)
+
+    def scored(self, tried: Trial, free_run: float | None = None) -> Tried:
+        """Return a trial with its scores; free_run: if it is known."""
+        return Tried(tried, balance_score(tried, self._evidence, self._floor), free_run)
+
+    def _in_held_back(self, best: Tried) -> list[Tried]:
+        """Return what suffices with one effect more that acts in the part held back alone.
+
+        The part that the fits see is explained without, so that nothing there asks for it.
+        """
+        unexplained = beyond(EXPLAINED)
+        if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
+            return []
+        near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
+        limit = (1.0 - PROMISING) * excess(best.trial, near)
+        found = []
+        for screened in screen_free_run(best.trial, self._sheet, near)[:MOST_SIMULATED]:
+            if excess(screened.trial, near) < limit:
+                fitted = self._whole.fitted(screened.trial)
+                if self._suffices(fitted, best.trial):
+                    found.append(self.scored(fitted, free_run_score(fitted, self._evidence)))
+        self.tried += found
+        return found
+
+    def _on_balances(self, known: Trial) -> OnBalances:
+        """Return each effect begun beside a trial; beside none they are asked for twice."""
+        if not known.effects and self._beside_none is not None:
+            return self._beside_none
+        begun = OnBalances(known, self._sheet, self._head, self._floor)
+        if not known.effects:
+            self._beside_none = begun
+        return begun
+
+    def _on_free_run(self, best: Tried) -> list[Tried]:
+        """Return the trials with one effect more that promise most on the free run.
+
+        Where it has long gone astray no first-order step says anything.
+        """
+        near = self._head.until(astray(best.trial, self._head) + SHORTEST)
+        found = screen_free_run(best.trial, self._sheet, near)
+        return [self.scored(self._led(s.trial, best)) for s in found[:MOST_SIMULATED]]
+
+    def _led(self, begun: Trial, best: Tried) -> Trial:
+        """Return a trial as it was begun on the free run, or as the balances have it, if better.
+
+        To first order play that opens seldom is far too small: it explains nothing until the
+        piston crosses it at the right instants.
+        """
+        if not self._evidence.complete:
+            return begun
+        start = trial(self._sheet, begun.effects, best.trial)
+        balanced = fit_balances(start, self._head, self._floor)
+        return min(begun, balanced, key=lambda t: excess(t, self._head))
+
+    def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
+        """Fit trials to the balances, those that come close to the best of them to the free run.
+
+        Return what is better. Where none is, the one that is ahead in the free run already.
+        """
+        known = {frozenset(tried.trial.effects) for tried in self.tried}
+        new = []
+        for screened in found:
+            if frozenset(screened.trial.effects) not in known:
+                known.add(frozenset(screened.trial.effects))
+                new.append(screened.trial)
+        round_ = []
+        for trial_ in new[:MOST_FITTED]:
+            self._progress(f"balances: {trial_.name}")
+            round_.append(self.scored(fit_balances(trial_, self._head, self._floor)))
+        least = min((t.balances for t in round_), default=np.inf)
+        limit = min(best.balances - STRONG, least + CLOSE)
+        close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
+        promising = close[:MOST_SIMULATED]
+        others = [t for t in round_ if t not in promising]
+        better = self._better(promising, best)
+        if not better:
+            ahead = self._ahead(others, best)
+            others = [t for t in others if t not in ahead]
+            better = self._better(ahead, best)
+        self.tried += others
+        return better
+
+    def _ahead(self, others: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial whose free run is best, if it is better than the best so far.
+
+        Though it is fitted to the balances alone: a free run adds up what they hardly know of,
+        such as a small leak.
+        """
+        least, ahead = free(best) - STRONG, []
+        for tried in others:
+            score = free_run_score(tried.trial, self._evidence)
+            if score < least:
+                least, ahead = score, [tried]
+        return ahead
+
+    def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
+        """Fit trials to the free run; return those that are better than the best so far."""
+        simulated = []
+        for tried in promising:
+            self._progress(f"free run: {tried.trial.name}")
+            simulated.append(self._simulated(tried))
+        self.tried += simulated
+        better = [t for t in simulated if free(t) < free(best) - STRONG]
+        better = better or [t for t in simulated if self._suffices(t.trial, best.trial)]
+        return better or self._late(simulated, best)
+
+    def _late(self, simulated: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial nearest to the whole recordings, fitted to them, if that suffices.
+
+        What acts in the part held back alone, as play that opens there, no fit has seen. One that
+        is no nearer than the best so far is not fitted: that takes long.
+        """
+        limit = self._whole.score(best.trial) - STRONG
+        nearest = min(simulated, key=lambda t: self._whole.score(t.trial), default=None)
+        if nearest is None or self._whole.score(nearest.trial) >= limit:
+            return []
+        fitted = replace(nearest, trial=self._whole.fitted(nearest.trial))
+        return [fitted] if self._suffices(fitted.trial, best.trial) else []
+
+    def _simulated(self, tried: Tried) -> Tried:
+        """Return a trial fitted to the free run.
+
+        Of several sizes of an effect one alone is taken where the others are not worth their while.
+        A load may have ended since. Where all that leads nowhere near, what else is missing drives
+        the free run away and the parameters with it: they stay as the balances say, if those are
+        all told. Nor do fewer terms of a series lead anywhere then.
+        """
+        full = fit_free_run(tried.trial, self._head)
+        hopeless = excess(full, self._head) > beyond(HOPELESS)
+        if self._evidence.complete and hopeless:
+            return replace(tried, free_run=free_run_score(full, self._evidence))
+        ways = [full]
+        for effect in full.effects:
+            if REGISTRY[effect].is_series:
+                ways += [] if hopeless else with_fewer_terms(full, effect, self._head)
+            else:
+                ways += full.with_each_size(effect)
+        if LOAD in full.effects:
+            ways += [with_a_late_end(way, self._evidence, SEEN) for way in ways]
+        scores = [free_run_score(way, self._evidence) for way in ways]
+        best_way = int(np.argmin(scores))
+        return Tried(ways[best_way], tried.balances, scores[best_way])
+
+    def _suffices(self, tried: Trial, best: Trial) -> bool:
+        """Tell whether the whole recordings need no more than a trial, and that far more than best.
+
+        For recordings too short for a part held back to tell: nothing may move in it.
+        """
+        better = self._whole.score(tried) < self._whole.score(best) - STRONG
+        return better and not self.enough(best) and self.enough(tried)
+
+    def _quiet(self, tried: Trial) -> bool:
+        return leaves_quiet(tried, self._evidence)
+
+    def _excess(self, tried: Trial) -> float:
+        return excess(tried, self._evidence)
+
+
+def free(tried: Tried) -> float:
+    """Return the score on the unseen free run, infinite where there is none."""
+    return float("inf") if tried.free_run is None else tried.free_run

@@ -21,6 +21,7 @@ from emir_analysis.diagnosis.select import (
     SEEN,
     STRONG,
     astray,
+    at_noise,
     balance_score,
     beyond,
     excess,
@@ -36,6 +37,7 @@ from emir_plant.sheet import Sheet
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
+MOST = 0.5  # share of the rest that is most of it
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
 
@@ -92,7 +94,7 @@ class Rounds:
         The balances are quiet then; the free run alone may know more. Beside what sticks, where a
         fit takes longest, only what takes a part away before it is fitted.
         """
-        least = 0.5 * self._excess(best.trial)
+        least = MOST * self._excess(best.trial)
         promising = self._on_free_run(best)
         if sticks(best.trial):
             limit = (1.0 - PROMISING) * excess(best.trial, self._head)
@@ -101,6 +103,27 @@ class Rounds:
         close = min(map(free, better), default=0.0) + STRONG
         better = [t for t in better if free(t) < close]
         return [t for t in better if self._excess(self._whole.fitted(t.trial)) < least]
+
+    def beside_explained(self, refitted: Trial) -> list[Tried]:
+        """Return what takes parameters alone to the noise that explain all but leave a little.
+
+        What acts in the part held back, and hardly before, only the whole knows: the part that the
+        fits see is at the noise without.
+        """
+        if at_noise(refitted, self._evidence) or not self.enough(refitted):
+            return []
+        self._progress(f"all effects in the whole recording beside: {refitted.name}")
+        least = self._whole.score(refitted) - STRONG
+        limit = MOST * self._excess(refitted)
+        found = []
+        for screened in screen_free_run(refitted, self._sheet, self._evidence)[:MOST_SIMULATED]:
+            if self._excess(screened.trial) < limit:
+                fitted = self._whole.fitted(screened.trial)
+                score = self._whole.score(fitted)
+                if score < least and at_noise(fitted, self._evidence) and self.enough(fitted):
+                    found.append(self.scored(fitted, score))
+        self.tried += found
+        return found
 
     def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with two effects beside parameters alone.

@@ -76,6 +76,9 @@ class Search:
         plain = self._rounds.scored(self._plain(), free_run_score(self.refitted, self._evidence))
         self._rounds.tried = [plain]
         best, equal, enough = self._one_at_a_time(plain)
+        if not best.trial.effects:
+            late = self._rounds.beside_explained(self.refitted)
+            equal, enough = (_as_good(late), True) if late else (equal, enough)
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)

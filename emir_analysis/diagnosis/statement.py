@@ -15,7 +15,7 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.screening import LOAD
-from emir_analysis.diagnosis.select import EXPLAINED
+from emir_analysis.diagnosis.select import EXPLAINED, at_noise
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import movement
@@ -63,7 +63,7 @@ def statement(findings: Findings, judged: Judged) -> str:
 
 def _of_findings(findings: Findings) -> str:
     if findings.verdict == "nothing_missing":
-        return "parameters inside the tolerances bring every balance and the free run to the noise"
+        return _of_parameters(findings)
     remainder = _remainder(findings)
     if findings.verdict == "unexplained":
         left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
@@ -78,6 +78,16 @@ def _of_findings(findings: Findings) -> str:
     left = f"; {remainder}" if remainder else ""
     more = other_reasons(findings.chosen) + _undecided(findings) + _unforeseeable(findings)
     return names + left + more
+
+
+def _of_parameters(findings: Findings) -> str:
+    if at_noise(findings.chosen, findings.evidence):
+        return "parameters inside the tolerances bring every balance and the free run to the noise"
+    left = math.sqrt(mean_square(findings.chosen, findings.evidence))
+    return (
+        "parameters inside the tolerances bring every balance to the noise and the free run to"
+        f" {left:.1f} times it, which no effect explains better"
+    )
 
 
 def _remainder(findings: Findings) -> str:

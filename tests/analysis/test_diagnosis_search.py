@@ -22,10 +22,12 @@ from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
 from emir_analysis.diagnosis.rounds import Tried
-from emir_analysis.diagnosis.run_errors import at_rest
+from emir_analysis.diagnosis.run_errors import at_rest, mean_square
 from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import (
+    AT_NOISE,
+    EXPLAINED,
     SEEN,
     STRONG,
     at_noise,
@@ -277,6 +279,20 @@ def test_a_judge_recording_lacks_nothing_that_other_parameters_explain(
     assert (said in statement(off_there, judgement)) == reconciled
 
 
+def test_how_much_parameters_leave_is_said() -> None:
+    _, sheet, evidence = search({})
+    found = diagnose(evidence.experiments, sheet, lambda _: None)
+    assert "the free run to the noise" in statement(found, judged(found, evidence.experiments))
+    paths = [unknown.path for unknown in found.refitted.unknowns.members]
+    off = found.refitted.x.copy()
+    off[paths.index("cylinder.beta")] += 0.1
+    near = replace(found, chosen=found.refitted.at(off))
+    judgement = judged(near, evidence.experiments)
+    left = judgement.off("with_effect")
+    assert left > AT_NOISE
+    assert f"the free run to {left:.1f} times it" in statement(near, judgement)
+
+
 def test_a_judge_recording_in_which_the_machine_cannot_rest_is_said_to_be_one() -> None:
     """With 300 bar in the lowering chamber the pump does not hold the boom."""
     _, sheet, evidence = search({})
@@ -314,6 +330,21 @@ def test_a_fault_of_the_logic_block_that_shuts_in_the_part_held_back_alone_is_fo
     assert found.effects == ("logic_block_fault",)
     threshold = found.machine.effects.logic_block_fault.threshold
     assert threshold == pytest.approx(30e5, rel=0.02)
+
+
+def test_what_acts_little_and_late_is_found() -> None:
+    """It lowers from the last third on: parameters alone are at the noise before, and near it."""
+    lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
+    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 2)
+    slow = with_values(joint1(), {"effects.valve_gain_asymmetry.lowering": -0.012})
+    evidence = Evidence([operated(slow, np.concatenate([lifted, lowered]), angle=1.2)], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    assert AT_NOISE**2 < mean_square(searched.refitted, evidence) < EXPLAINED**2
+    (found,) = searched.run()
+    assert found.effects == ("valve_gain_asymmetry",)
+    lowering = found.machine.effects.valve_gain_asymmetry.lowering
+    assert lowering == pytest.approx(-0.012, abs=0.002)
+    assert at_noise(found, evidence)
 
 
 @pytest.mark.parametrize(("bending", "first"), [(6.0, "force"), (12.0, "bending")])

@@ -78,7 +78,9 @@ class Search:
         best, equal, enough = self._one_at_a_time(plain)
         if not best.trial.effects:
             late = self._rounds.beside_explained(self.refitted)
-            equal, enough = (_as_good(late), True) if late else (equal, enough)
+            if late:
+                equal, enough = _as_good(late), True
+                self._settled = equal[0].effects
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+# Matrices are small, and threads cost more than they gain. Before numpy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Each of pytest-xdist's processes has one core: more threads there wait for each other.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")

@@ -13,9 +13,9 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, with_spread
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import misstated
 from emir_analysis.diagnosis.rounds import Tried
-from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape

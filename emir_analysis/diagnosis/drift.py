@@ -11,7 +11,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
-from emir_analysis.diagnosis.screening import LOAD
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.straight import least
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns

@@ -4,8 +4,8 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import mean_squares
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import coarse_errors
-from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.trial import Trial
 
 DURATION = f"effects.{LOAD}.duration"

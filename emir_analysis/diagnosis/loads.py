@@ -12,6 +12,7 @@ import numpy as np
 
 from emir_analysis.signals import Array
 
+LOAD = "external_load"  # in the registry
 FASTEST = 0.5  # Hz: faster swings average out over the windows of the force balance
 FREQUENCIES = 4  # that are tried in a bandwidth of 1 / duration
 FEWEST = 8  # windows over which a load has to swing

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from emir_analysis.diagnosis.candidate import Missing, soft
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
 from emir_analysis.diagnosis.fitting import FREE_RUN_STEP, fit_balances, fit_free_run, with_spread
-from emir_analysis.diagnosis.screening import Missing, in_balances, in_free_run, soft
+from emir_analysis.diagnosis.screening import in_balances, in_free_run
 from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_score, leaves_quiet
 from emir_analysis.diagnosis.straight import least
 from emir_analysis.diagnosis.trial import Trial

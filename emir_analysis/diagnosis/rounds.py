@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from emir_analysis.diagnosis.candidate import Screened
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fitting import (
@@ -14,7 +15,8 @@ from emir_analysis.diagnosis.fitting import (
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.late_end import with_a_late_end
-from emir_analysis.diagnosis.screening import LOAD, OnBalances, Screened, screen_free_run
+from emir_analysis.diagnosis.loads import LOAD
+from emir_analysis.diagnosis.screening import OnBalances, screen_free_run
 from emir_analysis.diagnosis.select import (
     EXPLAINED,
     HOPELESS,

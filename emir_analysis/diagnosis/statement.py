@@ -13,8 +13,8 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
-from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing

@@ -18,8 +18,8 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
     without_breakaway,
 )
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
-from emir_analysis.diagnosis.screening import LOAD
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     HOPELESS,

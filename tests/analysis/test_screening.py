@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from operated import moved
 
+from emir_analysis.diagnosis.candidate import Left
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.fitting import fit_balances
-from emir_analysis.diagnosis.screening import OnBalances, _Left
+from emir_analysis.diagnosis.screening import OnBalances
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.signals import Array
@@ -52,7 +53,7 @@ def test_what_shapes_an_effect_is_not_moved_along_straight_lines() -> None:
     def missing(trials: list[Trial]) -> Array:
         return np.array([1e3 * (one.x - wanted) for one in trials])
 
-    (best,) = _Left(known, missing, 1e-3).inside([known])[1]
+    (best,) = Left(known, missing, 1e-3).inside([known])[1]
     moved = {name for name, b, a in zip(paths, best, x, strict=True) if abs(b - a) > 1e-3}
     assert moved == {"beta", "force", "mean"}
     assert best[paths.index("force")] == pytest.approx(x[paths.index("force")] + 0.4, rel=1e-3)
@@ -73,7 +74,7 @@ def test_parameters_that_do_their_best_stay_inside_their_bounds_to_the_last_digi
         def missing(trials: list[Trial], a: Array = slopes, b: Array = wanted) -> Array:
             return np.array([a @ (one.x - b) for one in trials])
 
-        (best,) = _Left(known, missing, 1e-3).inside([known])[1]
+        (best,) = Left(known, missing, 1e-3).inside([known])[1]
         members.at(best)  # raises outside the range
         assert np.all((best >= low) & (best <= high))
         on_bounds += np.count_nonzero((best == low) | (best == high))

@@ -1,5 +1,7 @@
 """One round of a search: which trials with an effect more are better than the best so far."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,7 +86,7 @@ class Rounds:
             near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
             told = near or self._evidence.complete
             if told and not self._quiet(best.trial):
-                return better
+                return better or self._in_held_back(best)
         known = [t.trial.effects for t in better]
         others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
         better += self._better(others, best)
@@ -106,24 +108,22 @@ class Rounds:
         better = [t for t in better if free(t) < close]
         return [t for t in better if self._excess(self._whole.fitted(t.trial)) < least]
 
-    def beside_explained(self, refitted: Trial) -> list[Tried]:
-        """Return what takes parameters alone to the noise that explain all but leave a little.
+    def beside_explained(self, known: Trial) -> list[Tried]:
+        """Return what takes a trial to the noise that explains the whole but leaves a little.
 
         What acts in the part held back, and hardly before, only the whole knows: the part that the
-        fits see is at the noise without.
+        fits see is at the noise without. known: fitted to the whole.
         """
-        if at_noise(refitted, self._evidence) or not self.enough(refitted):
+        if at_noise(known, self._evidence) or not self.enough(known):
             return []
-        self._progress(f"all effects in the whole recording beside: {refitted.name}")
-        least = self._whole.score(refitted) - STRONG
-        limit = MOST * self._excess(refitted)
+        self._progress(f"all effects in the whole recording beside: {known.name}")
+        least = self._whole.score(known) - STRONG
+        limit = MOST * self._excess(known)
         found = []
-        for screened in screen_free_run(refitted, self._sheet, self._evidence)[:MOST_SIMULATED]:
-            if self._excess(screened.trial) < limit:
-                fitted = self._whole.fitted(screened.trial)
-                score = self._whole.score(fitted)
-                if score < least and at_noise(fitted, self._evidence) and self.enough(fitted):
-                    found.append(self.scored(fitted, score))
+        for fitted in self._promising(known, self._evidence, limit):
+            score = self._whole.score(fitted)
+            if score < least and at_noise(fitted, self._evidence) and self.enough(fitted):
+                found.append(self.scored(fitted, score))
         self.tried += found
         return found
 
@@ -154,19 +154,32 @@ class Rounds:
 
         The part that the fits see is explained without, so that nothing there asks for it.
         """
-        unexplained = beyond(EXPLAINED)
-        if excess(best.trial, self._head) > unexplained or self._excess(best.trial) <= unexplained:
+        if excess(best.trial, self._head) > beyond(EXPLAINED) or self.enough(best.trial):
             return []
         near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
         limit = (1.0 - PROMISING) * excess(best.trial, near)
-        found = []
-        for screened in screen_free_run(best.trial, self._sheet, near)[:MOST_SIMULATED]:
-            if excess(screened.trial, near) < limit:
-                fitted = self._whole.fitted(screened.trial)
-                if self._suffices(fitted, best.trial):
-                    found.append(self.scored(fitted, free_run_score(fitted, self._evidence)))
+        found = [
+            self.scored(fitted, free_run_score(fitted, self._evidence))
+            for fitted in self._promising(best.trial, near, limit)
+            if self._suffices(fitted, best.trial)
+        ]
         self.tried += found
         return found
+
+    def _promising(self, known: Trial, evidence: Evidence, limit: float) -> Iterator[Trial]:
+        """Yield trials with one effect more that leave less than a limit, fitted to the whole.
+
+        evidence: in whose free run they are looked for. Far behind one that suffices none is
+        fitted.
+        """
+        least = math.inf
+        found = screen_free_run(known, self._sheet, evidence, faint=True)
+        for screened in found[:MOST_SIMULATED]:
+            if screened.cost < least + CLOSE and excess(screened.trial, evidence) < limit:
+                fitted = self._whole.fitted_from(screened.trial)
+                yield fitted
+                if self.enough(fitted):
+                    least = min(least, screened.cost)
 
     def _on_balances(self, known: Trial) -> OnBalances:
         """Return each effect begun beside a trial; beside none they are asked for twice."""

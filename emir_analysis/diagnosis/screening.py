@@ -79,16 +79,21 @@ class OnBalances:
         return sorted((c.fitted() for c in together), key=lambda s: s.cost)
 
 
-def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:
+def screen_free_run(
+    known: Trial, sheet: Sheet, evidence: Evidence, *, faint: bool = False
+) -> list[Screened]:
     """Return the known trial with each further effect of the registry, the best first.
 
     By the free run, for a known trial whose balances are quiet: the step that is best to first
     order promises too much far from there, so it is simulated, and shorter ones too.
+    faint: loads are told by the free run even where there is a balance of forces, in which they
+    may be less than its noise; that takes long.
     """
     missing = in_free_run(known, evidence)
     left = Left(known, missing, FREE_RUN_STEP)
-    told = evidence.told[FORCE]
-    loads = _by_balance(known, evidence) if told else _by_free_run(known, sheet, evidence, left)
+    loads = _by_balance(known, evidence)
+    if faint or not evidence.told[FORCE]:
+        loads += _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
     return sorted((c.stepped(missing) for c in begun), key=lambda s: s.cost)
 

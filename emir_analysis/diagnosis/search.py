@@ -77,17 +77,28 @@ class Search:
         self._rounds.tried = [plain]
         best, equal, enough = self._one_at_a_time(plain)
         if not best.trial.effects:
-            late = self._rounds.beside_explained(self.refitted)
-            if late:
-                equal, enough = _as_good(late), True
-                self._settled = equal[0].effects
+            late = self._by_whole(self.refitted)
+        else:
+            late = self._by_whole(self.whole.fitted(best.trial)) if enough else []
+        equal, enough = (late, True) if late else (equal, enough)
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)
         if not enough:
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
+        if equal[0].effects and not needed.effects:  # the whole has not been asked beside none
+            return self._by_whole(self.refitted) or [needed]
         return equal if needed is equal[0] else self._equal.get(needed.effects, [needed])
+
+    def _by_whole(self, known: Trial) -> list[Trial]:
+        """Return the best trials with one effect more that the whole alone tells, if there are any.
+
+        known: fitted to the whole.
+        """
+        many = len(known.effects) >= MOST_EFFECTS
+        better = [] if many or sticks(known) else self._rounds.beside_explained(known)
+        return _as_good(better) if better else []
 
     def _plain(self) -> Trial:
         """Return the parameters alone as effects are looked for beside them.

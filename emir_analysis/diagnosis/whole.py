@@ -66,6 +66,16 @@ class Whole:
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
+    def fitted_from(self, begun: Trial) -> Trial:
+        """Return a trial fitted from where it is begun, if that is better than what is known.
+
+        With the same effects a fit may have begun elsewhere and led nowhere.
+        """
+        known = self._known.get(begun.effects)
+        if known is not None and self.score(begun) < self.score(known):
+            del self._known[begun.effects]
+        return self.fitted(begun)
+
     def led(self, chosen: Trial) -> Trial | None:
         """Return a trial that sticks led along a beginning that grows, if it is all that is needed.
 

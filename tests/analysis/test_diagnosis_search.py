@@ -347,6 +347,19 @@ def test_what_acts_little_and_late_is_found() -> None:
     assert at_noise(found, evidence)
 
 
+@pytest.mark.parametrize(("force", "beside"), [(-100.0, {}), (-60.0, SHIFT)])
+def test_a_small_load_late_is_found(force: float, beside: dict[str, float]) -> None:
+    """Of 10 kg, from 12 of 16 s on; the part that the fits see ends after 10.7 s."""
+    load = {"effects.external_load.force": force, "effects.external_load.start": 12.0}
+    searched, _, evidence = search(load | beside | {"effects.external_load.duration": 1e4})
+    found = searched.run()[0]
+    names = {path.split(".")[1] for path in load | beside}
+    assert set(found.effects) == names
+    assert at_noise(searched.whole.fitted(found), evidence)
+    told = searched.whole.fitted(found).machine.effects.external_load
+    assert told.start == pytest.approx(12.0, abs=0.1)
+
+
 @pytest.mark.parametrize(("bending", "first"), [(6.0, "force"), (12.0, "bending")])
 def test_bending_that_no_force_makes_comes_first(bending: float, first: str) -> None:
     """A missing force makes it no louder than the force balance, a loose flange does."""

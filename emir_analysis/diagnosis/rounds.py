@@ -1,6 +1,5 @@
 """One round of a search: which trials with an effect more are better than the best so far."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -9,17 +8,14 @@ import numpy as np
 from emir_analysis.diagnosis.candidate import Screened
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
-from emir_analysis.diagnosis.fitting import (
-    fit_balances,
-    fit_free_run,
-    with_fewer_terms,
-)
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, with_fewer_terms
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.late_end import with_a_late_end
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.screening import OnBalances, screen_free_run
 from emir_analysis.diagnosis.select import (
+    AT_NOISE,
     EXPLAINED,
     HOPELESS,
     SEEN,
@@ -119,11 +115,13 @@ class Rounds:
         self._progress(f"all effects in the whole recording beside: {known.name}")
         least = self._whole.score(known) - STRONG
         limit = MOST * self._excess(known)
-        found = []
-        for fitted in self._promising(known, self._evidence, limit):
-            score = self._whole.score(fitted)
-            if score < least and at_noise(fitted, self._evidence) and self.enough(fitted):
-                found.append(self.scored(fitted, score))
+        found = [
+            self.scored(fitted, free_run_score(fitted, self._evidence))
+            for fitted in self._promising(known, self._evidence, limit)
+            if self._whole.score(fitted) < least
+            and at_noise(fitted, self._evidence)
+            and self.enough(fitted)
+        ]
         self.tried += found
         return found
 
@@ -169,17 +167,16 @@ class Rounds:
     def _promising(self, known: Trial, evidence: Evidence, limit: float) -> Iterator[Trial]:
         """Yield trials with one effect more that leave less than a limit, fitted to the whole.
 
-        evidence: in whose free run they are looked for. Far behind one that suffices none is
-        fitted.
+        evidence: in whose free run they are looked for. Once one suffices, only those are fitted
+        that are at the noise there as they are begun.
         """
-        least = math.inf
-        found = screen_free_run(known, self._sheet, evidence, faint=True)
-        for screened in found[:MOST_SIMULATED]:
-            if screened.cost < least + CLOSE and excess(screened.trial, evidence) < limit:
+        told = False
+        for screened in screen_free_run(known, self._sheet, evidence, faint=True)[:MOST_SIMULATED]:
+            most = beyond(AT_NOISE) if told else limit
+            if excess(screened.trial, evidence) < most:
                 fitted = self._whole.fitted_from(screened.trial)
                 yield fitted
-                if self.enough(fitted):
-                    least = min(least, screened.cost)
+                told = told or self.enough(fitted)
 
     def _on_balances(self, known: Trial) -> OnBalances:
         """Return each effect begun beside a trial; beside none they are asked for twice."""

@@ -5,12 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fitting import (
-    fit_balances,
-    fit_free_run,
-    following,
-    refine_free_run,
-)
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following, refine_free_run
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
@@ -87,7 +82,7 @@ class Search:
         if not enough:
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
-        if equal[0].effects and not needed.effects:  # the whole has not been asked beside none
+        if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
         return equal if needed is equal[0] else self._equal.get(needed.effects, [needed])
 

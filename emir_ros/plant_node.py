@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Header
 
@@ -154,13 +155,18 @@ class PlantNode(Shell):
     # real time: simulated time keeps up with the clock, with the latest command
 
     def _start_realtime(self) -> None:
-        self._command_received = -math.inf
+        self._command_received = self._now = -math.inf
         self._beat = Beat(PLANT_PERIOD)
         self.diagnostics.figures = self._figures
         self._compile()
         self._publish_sensors(self.get_clock().now().nanoseconds)
         self._started: float | None = None
-        self.create_timer(PLANT_PERIOD, self._on_timer)
+        self.start_timer(PLANT_PERIOD, self._on_timer)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go on from where the machine was left: its time has stood still."""
+        self._started = None
+        return super().on_activate(state)
 
     def _compile(self) -> None:
         """Take a step that does not count: the very first compiles the machine, for seconds."""
@@ -174,11 +180,12 @@ class PlantNode(Shell):
         return self._beat.values() | pressures(self.machine.signals(self.tick))
 
     def _on_timer(self) -> None:
-        if self._started is None or not self.active:  # time stands still
-            self._started = time.monotonic() - self.tick * PLANT_PERIOD
-            return
-        self._beat.tick(self.seconds())
-        due = int((time.monotonic() - self._started) / PLANT_PERIOD)
+        now = self.seconds()
+        if self._started is None or now < self._now:  # /clock was set back
+            self._started = now - self.tick * PLANT_PERIOD
+        self._now = now
+        self._beat.tick(now)
+        due = int((now - self._started) / PLANT_PERIOD)
         if due - self.tick > TICKS:
             self.get_logger().warning(
                 f"{due - self.tick} plant periods late", throttle_duration_sec=2.0
@@ -197,7 +204,7 @@ class PlantNode(Shell):
     def _fresh_command(self) -> Signals:
         if self._command is None:
             return self._shut
-        if time.monotonic() - self._command_received > self.own.command_timeout:
+        if self.seconds() - self._command_received > self.own.command_timeout:
             self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {self._valves.name}")
             return self._shut
         return self._command[1]
@@ -212,7 +219,7 @@ class PlantNode(Shell):
         else:
             self.diagnostics.say(Level.OK, "running")
         self._command = (stamp_ns(data), command)
-        self._command_received = time.monotonic()
+        self._command_received = self.seconds()
         if self.lockstep:
             self._advance_when_answered()
 

@@ -19,7 +19,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosbags.highlevel import AnyReader
-from rosgraph_msgs.msg import Clock
+from sim_clock import DEADLINE, SIM_TIME, SimClock
 
 from emir_analysis.recover import recover
 from emir_msgs_py import conversions
@@ -44,18 +44,16 @@ SIGNALS = {
     "pressure_lifting": 1e7,
     "pressure_lowering": 2e6,
 }
-DEADLINE = 120.0  # s, on a busy computer
 
 
 class Bench:
     """The force loop on a test bench: time and inputs are given to it, its commands heard."""
 
     def __init__(self) -> None:
-        self.loop = ForceLoopNode(["--ros-args", "-p", "use_sim_time:=true"])
+        self.loop = ForceLoopNode(SIM_TIME)
         self.node = Node("bench")
         self.valve: list[float] = []
         profile = qos.offered(lockstep=False)
-        self._clock = self.node.create_publisher(Clock, "/clock", 10)
         self._inputs = {
             topic.name: self.node.create_publisher(
                 conversions.message_class(topic.type), topic.name, profile
@@ -67,11 +65,11 @@ class Bench:
         self._executor = SingleThreadedExecutor()
         for node in (self.loop, self.node):
             self._executor.add_node(node)
-        self.now = HOUR
+        self._clock = SimClock(self.node, self._executor)
         self.until(self._connected)
 
     def _connected(self) -> bool:
-        return all(p.get_subscription_count() for p in (self._clock, *self._inputs.values()))
+        return all(p.get_subscription_count() for p in self._inputs.values())
 
     def _on_valve(self, message: Any) -> None:
         self.valve.append(conversions.values(VALVE_COMMAND, message)["valve_command"])
@@ -85,15 +83,10 @@ class Bench:
 
     def tick(self, inputs: Any = INPUTS, step: int = PLANT_PERIOD_NS) -> None:
         """Let time go on by a step, ns, and then give the inputs."""
-        self.now += step
-        clock = Clock()
-        clock.clock.sec, clock.clock.nanosec = divmod(self.now, 1_000_000_000)
-        self._clock.publish(clock)
-        self.until(lambda: self.loop.get_clock().now().nanoseconds == self.now)
+        self._clock.advance([self.loop], step)
         for topic in inputs:
-            self._inputs[topic.name].publish(conversions.message(topic, self.now, SIGNALS))
-        for _ in range(4 * len(INPUTS)):  # what has come is taken, and a timer that is due
-            self._executor.spin_once(timeout_sec=0.001)
+            self._inputs[topic.name].publish(conversions.message(topic, self._clock.now, SIGNALS))
+        self._clock.settle()
 
     def empty(self, topic: Topic) -> None:
         """Publish a message of a topic that holds no numbers."""

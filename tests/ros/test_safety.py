@@ -1,4 +1,8 @@
-"""What the graph does when a node dies, a number is none, two command at once, one is switched."""
+"""What the graph does when a node dies, a number is none, two command at once, one is switched.
+
+Time comes from /clock or from lock step, so that the computer's load has no part in what is seen;
+only a process that is killed has the computer's own.
+"""
 
 import math
 import os
@@ -20,6 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from sim_clock import SIM_TIME, SimClock
 
 from emir_control.limits import LimitParameters
 from emir_control.prefilter import PrefilterParameters, joint_angle
@@ -49,6 +54,12 @@ from emir_ros.trajectory_node import TrajectoryNode
 
 AT_ONCE = ["--ros-args", "-p", "delay:=0.2"]
 LOCKSTEP = ["--ros-args", "-p", "lockstep:=true"]
+CASCADED: tuple[Callable[[], Node], ...] = (
+    lambda: PlantNode(SIM_TIME),
+    lambda: TrajectoryNode([*SIM_TIME, "-p", "delay:=0.2"]),
+    lambda: CascadeNode(SIM_TIME),
+    lambda: ForceLoopNode(SIM_TIME),
+)
 INPUTS = (
     (VELOCITY_COMMAND, {"velocity_command": 0.02}),
     (JOINT_STATES, {"angle": 0.8}),
@@ -99,12 +110,24 @@ class Listener(Node):
 class Graph:
     """Nodes in this process, spun while a condition is waited for."""
 
-    def __init__(self, nodes: list[Node], *, lockstep: bool = False) -> None:
+    def __init__(
+        self, nodes: list[Node], *, lockstep: bool = False, sim_time: bool = False
+    ) -> None:
         self.listener = Listener(lockstep=lockstep)
         self.nodes: list[Node] = []
         self.executor = SingleThreadedExecutor()
+        self._clock = SimClock(self.listener, self.executor) if sim_time else None
         for node in (self.listener, *nodes):
             self.add(node)
+
+    def node(self, name: str) -> Node:
+        """Return the node of a name."""
+        (found,) = (node for node in self.nodes if node.get_name() == name)
+        return found
+
+    def spool(self) -> float:
+        """Return where the valve's spool was heard to be last."""
+        return ([0.0, *self.listener.of(TRUTH)])[-1]
 
     def add(self, node: Node) -> None:
         """Let a node join."""
@@ -116,10 +139,17 @@ class Graph:
         deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline, f"{what}; {self.listener.said}"
-            self.executor.spin_once(timeout_sec=0.02)
+            self._spin()
             for node in self.nodes:
                 if isinstance(node, Shell):
                     node.check()
+
+    def _spin(self) -> None:
+        if self._clock is None:
+            self.executor.spin_once(timeout_sec=0.02)
+            return
+        self._clock.advance([node for node in self.nodes if isinstance(node, Shell)])
+        self._clock.settle()
 
     def lose(self, node: Node) -> None:
         """Let a node die."""
@@ -129,9 +159,11 @@ class Graph:
 
 
 @contextmanager
-def _graph(*makes: Callable[[], Node], lockstep: bool = False) -> Iterator[Graph]:
+def _graph(
+    *makes: Callable[[], Node], lockstep: bool = False, sim_time: bool = False
+) -> Iterator[Graph]:
     rclpy.init()
-    graph = Graph([make() for make in makes], lockstep=lockstep)
+    graph = Graph([make() for make in makes], lockstep=lockstep, sim_time=sim_time)
     try:
         yield graph
     finally:
@@ -168,12 +200,11 @@ def test_a_killed_controller_shuts_the_valve_within_a_period_and_it_is_said() ->
 
 
 def test_a_controller_restarted_while_it_moves_takes_the_motion_up_again() -> None:
-    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
-    with _graph(*makes) as graph:
+    with _graph(*CASCADED, sim_time=True) as graph:
         graph.until(_moves(graph), "the machine does not move")
-        graph.lose(graph.nodes[3])
+        graph.lose(graph.node("cascade_node"))
         graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] == 0.0, "the valve stays open")
-        graph.add(CascadeNode())
+        graph.add(CascadeNode(SIM_TIME))
         graph.until(lambda: graph.listener.of(VALVE_COMMAND)[-1] > 0.3, "it does not go on")
         heard = graph.listener.of(VALVE_COMMAND)
         first = max(k for k, value in enumerate(heard) if value == 0.0)
@@ -184,49 +215,39 @@ def test_a_controller_restarted_while_it_moves_takes_the_motion_up_again() -> No
     ("victim", "again"), [("trajectory_node", TrajectoryNode), ("force_loop_node", ForceLoopNode)]
 )
 def test_any_other_node_restarted_while_it_moves_takes_the_motion_up_again(
-    victim: str, again: Callable[[], Node]
+    victim: str, again: Callable[[list[str]], Node]
 ) -> None:
-    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
-    with _graph(*makes) as graph:
-
-        def spool() -> float:
-            return ([0.0, *graph.listener.of(TRUTH)])[-1]
-
+    with _graph(*CASCADED, sim_time=True) as graph:
         graph.until(_moves(graph), "the machine does not move")
-        graph.until(lambda: spool() > 0.2, "the spool does not move")
-        graph.lose(next(node for node in graph.nodes if node.get_name() == victim))
-        graph.until(lambda: abs(spool()) < 0.01, "the valve stays open")
+        graph.until(lambda: graph.spool() > 0.2, "the spool does not move")
+        graph.lose(graph.node(victim))
+        graph.until(lambda: abs(graph.spool()) < 0.01, "the valve stays open")
         before = len(graph.listener.of(VALVE_COMMAND))
-        graph.add(again())
-        graph.until(lambda: spool() > 0.2, "it does not go on")
+        graph.add(again(SIM_TIME))
+        graph.until(lambda: graph.spool() > 0.2, "it does not go on")
         assert max(graph.listener.of(VALVE_COMMAND)[before:]) < 1.0  # not at full stroke at once
 
 
 def test_a_dead_force_loop_shuts_the_valve_in_the_machine() -> None:
-    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode)
-    with _graph(*makes) as graph:
-        force_loop = graph.nodes[4]
-
-        def spool() -> float:
-            return ([0.0, *graph.listener.of(TRUTH)])[-1]
-
+    with _graph(*CASCADED, sim_time=True) as graph:
         graph.until(_moves(graph), "the machine does not move")
-        graph.until(lambda: spool() > 0.2, "the spool does not move")
-        graph.lose(force_loop)
-        graph.until(lambda: abs(spool()) < 0.1, "the spool stays where it was")
+        graph.until(lambda: graph.spool() > 0.2, "the spool does not move")
+        graph.lose(graph.node("force_loop_node"))
+        graph.until(lambda: abs(graph.spool()) < 0.1, "the spool stays where it was")
         said = "/plant_node: valve shut: no fresh valve_command"
         graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
 
 
 def test_two_controllers_at_once_shut_the_valve_until_one_is_gone() -> None:
-    makes = (PlantNode, lambda: TrajectoryNode(AT_ONCE), CascadeNode, ForceLoopNode, PfcNode)
-    with _graph(*makes) as graph:
+    with _graph(*CASCADED, lambda: PfcNode(SIM_TIME), sim_time=True) as graph:
+        valve = graph.listener.of
         said = "/force_loop_node: valve shut: more than one node publishes velocity_command"
         graph.until(lambda: said in graph.listener.complaints(), "nothing is said")
-        graph.until(lambda: len(graph.listener.of(VALVE_COMMAND)) > 5, "no valve command")
-        assert not any(graph.listener.of(VALVE_COMMAND)[-5:])
-        graph.lose(graph.nodes[5])
-        graph.until(_moves(graph), "the machine does not move with one")
+        before = len(valve(VALVE_COMMAND))
+        graph.until(lambda: len(valve(VALVE_COMMAND)) > before + 5, "no valve command")
+        assert not any(valve(VALVE_COMMAND)[before:])
+        graph.lose(graph.node("pfc_node"))
+        graph.until(lambda: valve(VALVE_COMMAND)[-1] > 0.3, "the machine does not move with one")
 
 
 def test_a_switch_by_parameter_while_it_moves_goes_without_a_jump() -> None:

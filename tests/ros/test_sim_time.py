@@ -12,16 +12,19 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from sim_clock import SIM_TIME, SimClock
 
 from emir_msgs_py.conversions import stamp_ns
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, VELOCITY_COMMAND
 from emir_ros.cascade_node import CascadeNode
+from emir_ros.plant_node import PlantNode
 from emir_ros.replay_node import ReplayNode
 
 pytestmark = pytest.mark.usefixtures("ros")
 
 OWN_BAG = Path(__file__).parents[2] / "bags" / "lift"  # 3.2 s
 END = 3_200_000_000  # ns
+HOUR = 3600 * 1_000_000_000  # ns
 
 
 def _words(**parameters: Any) -> list[str]:
@@ -81,4 +84,27 @@ def test_a_controller_lives_in_the_recordings_time() -> None:
         assert stamps == sorted(stamps)
     finally:
         for node in nodes:
+            node.destroy_node()
+
+
+@pytest.mark.parametrize("jump", [0, -HOUR], ids=["on", "set back"])
+def test_the_machine_lives_in_the_clocks_time(jump: int) -> None:
+    """A plant period of /clock is one of the machine, also after the clock was set back."""
+    listener, plant = Node("listener"), PlantNode(SIM_TIME)
+    executor = SingleThreadedExecutor()
+    for node in (plant, listener):
+        executor.add_node(node)
+    clock = SimClock(listener, executor)
+    try:
+        for step in (1, jump + 1, 1):  # from the first on the node has a time
+            clock.advance([plant], step)
+        clock.settle()
+        before = plant.tick
+        for _ in range(50):
+            clock.advance([plant])
+            clock.settle()
+        assert abs(plant.tick - before - 50) <= 1
+        plant.check()
+    finally:
+        for node in (plant, listener):
             node.destroy_node()

@@ -44,7 +44,7 @@ class Ready:
         if isinstance(self.control, PlansMoves):
             return self._step_planned(self.control, state, signals, dt)
         before = start = self._caught_up(state, signals, dt)
-        stands_by = before is not None and not self._drives(signals)
+        stands_by = "applied_command" in signals and not self._drives(signals)
         if stands_by and isinstance(self.control, Switchable):
             start = self.control.take_over(before, signals, signals["applied_command"], dt)
         own, outputs = self.control.step(start, signals, dt)

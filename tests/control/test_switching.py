@@ -110,6 +110,17 @@ def test_one_that_follows_its_twin_offers_what_the_twin_commands() -> None:
     assert followed.errors == pytest.approx(driving.errors, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", CONTROLS)
+def test_one_that_begins_anew_beside_one_that_drives_offers_its_command(name: str) -> None:
+    """It was without inputs for a while, and may be chosen in its first period."""
+    signals = {"stroke": 0.5, "angle": 0.8, "deflection": 0.01, "force": 2e5}
+    signals |= {"reference_stroke": 0.52, "reference_velocity": 0.025}
+    signals |= {f"reference_stroke_{k}_ahead": 0.52 + 8e-4 * k for k in range(1, 21)}
+    signals |= {"applied_command": 0.021, f"{name}_active": 0.0}
+    _, offered = Ready(name, CONTROLS[name]).step(None, signals, 0.032)
+    assert offered[f"{name}_command"] == pytest.approx(0.021, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("controllers", "switches", "said"),
     [

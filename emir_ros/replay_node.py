@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from mcap.records import Channel, Schema
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
@@ -78,6 +79,11 @@ class ReplayNode(Shell):
         self._looked = time.monotonic()
         self.start_steady_timer(PERIOD, self._on_timer)  # else it would wait for its own /clock
 
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go on from where the recording was left: its time has stood still."""
+        self._looked = time.monotonic()
+        return super().on_activate(state)
+
     def close(self) -> None:
         """Wait until what was published last has been received."""
         for publisher in self._by_topic.values():
@@ -138,10 +144,9 @@ class ReplayNode(Shell):
         return response
 
     def _on_timer(self) -> None:
-        now = time.monotonic()
-        if not self.active:  # the recording's time stands still
-            self._looked = now
+        if not self.active:
             return
+        now = time.monotonic()
         if not self._paused:
             rate: float = self.get_parameter("rate").value
             self._position += (now - self._looked) * rate * conversions.NANOSECONDS

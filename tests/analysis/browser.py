@@ -15,6 +15,7 @@ QUIET = (  # it looks for its maker's hosts otherwise
     "--disable-sync",
     "--no-first-run",
 )
+PATIENCE = 120_000.0  # ms, on a busy computer
 
 
 @contextmanager
@@ -26,6 +27,7 @@ def page(width: int = 1200, height: int = 900) -> Iterator[Page]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(QUIET))
         view = browser.new_page(viewport={"width": width, "height": height})
+        view.set_default_timeout(PATIENCE)
         errors: list[str] = []
         view.on("pageerror", lambda error: errors.append(str(error)))
         yield view

@@ -75,7 +75,7 @@ def test_services_and_messages_as_objects_are_heard_all_the_same(
     first.create_service(Trigger, "ask", serve)
     first.create_subscription(String, "word", hear, qos.latched())
     client = second.create_client(Trigger, "ask")
-    assert client.wait_for_service(20.0)
+    assert client.wait_for_service(120.0)
     client.call_async(Trigger.Request())
     _spin([first, second], ended, stop)
     assert heard[0][0] == "served"

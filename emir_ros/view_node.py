@@ -1,6 +1,7 @@
 """view_node: the running graph as a page in the browser (`emir view --live`). It only listens."""
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -39,6 +40,8 @@ SHOWN = (
 )
 PERIOD = 0.1  # s, of the page
 KEPT = 300  # frames: the last 30 s
+SILENT = 0.5  # s behind the others: a topic's numbers are no longer shown
+NOTHING = 1.0  # s without anything, which is then said
 HIGHEST_PORT = 65535
 
 
@@ -51,7 +54,7 @@ class ViewNode(Shell):
         reject_unknown(self)
         if not 0 < port <= HIGHEST_PORT:
             raise ParameterError(f"view_node: port = {port}: outside 1 ... {HIGHEST_PORT}")
-        self._signals: dict[str, float] = {}
+        self._heard: dict[str, tuple[float, dict[str, float]]] = {}  # when, s; steady clock
         self._stamp = math.nan
         self._frame: Callable[[float, dict[str, float]], Any]
         self._history: deque[Any] = deque(maxlen=KEPT)
@@ -89,23 +92,50 @@ class ViewNode(Shell):
             if not self.active:
                 return
             try:
-                self._signals.update(conversions.values(topic, message))
+                values = conversions.values(topic, message)
             except LookupError as error:
                 self.malformed(topic.name, error)
                 return
+            self._heard[topic.name] = time.monotonic(), values
             self._stamp = conversions.stamp_ns(message) / conversions.NANOSECONDS
 
         kind = conversions.message_class(topic.type)
         profile = qos.requested(topic, lockstep=False)
         self.create_subscription(kind, topic.name, receive, profile)
 
+    @property
+    def note(self) -> str:
+        """Return what the page says besides: that nothing comes."""
+        return self._page.note
+
+    def _last_heard(self) -> float:
+        """Return when the last message came, s of the steady clock; -inf: none did."""
+        return max((when for when, _ in self._heard.values()), default=-math.inf)
+
+    def _signals(self) -> dict[str, float]:
+        """Return the numbers of the topics that are still published."""
+        since = self._last_heard() - SILENT
+        groups = [values for when, values in self._heard.values() if when >= since]
+        return {name: value for group in groups for name, value in group.items()}
+
     def _show(self) -> None:
+        silent = time.monotonic() - self._last_heard()
+        self._page.say(_silence(silent) if silent > NOTHING else "")
+        if self._history and self._stamp < self._history[-1].time - SILENT:
+            self._history.clear()  # another run has begun
         if math.isnan(self._stamp) or (self._history and self._stamp <= self._history[-1].time):
             return  # nothing new
-        self._history.append(self._frame(self._stamp, self._signals))
+        self._history.append(self._frame(self._stamp, self._signals()))
         self._page.show(self._history[-1])
         if len(self._history) > 1:
             self._page.plot(list(self._history), self._stamp)
+
+
+def _silence(seconds: float) -> str:
+    """Return what is said when nothing has come for a while."""
+    if math.isinf(seconds):
+        return "**nothing heard yet**"
+    return f"**nothing heard for {seconds:.0f} s**; the last is shown"
 
 
 def frame(time: float, signals: dict[str, float], length: float) -> Frame:

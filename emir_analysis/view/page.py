@@ -53,6 +53,7 @@ class Page:
         scene.add_grid("/ground", 60.0, 60.0, plane="xy", cell_size=1.0, section_size=5.0,
                        position=(0.0, 0.0, -1.6))  # fmt: skip
         self._scene = scene
+        self._note = server.gui.add_markdown("", visible=False)
         self._readings = server.gui.add_markdown("")
         self.bending = server.gui.add_slider("bending drawn times", 1, 20, 1, 5)
         self._charts = [self._add_chart(server, chart) for chart in subject.charts]
@@ -61,6 +62,16 @@ class Page:
     def readings(self) -> str:
         """Return the numbers that are shown, as Markdown."""
         return self._readings.content
+
+    @property
+    def note(self) -> str:
+        """Return what is said above the numbers, as Markdown."""
+        return self._note.content
+
+    def say(self, note: str) -> None:
+        """Say something above the numbers, in Markdown, or nothing."""
+        if note != self._note.content:
+            self._note.content, self._note.visible = note, bool(note)
 
     def show(self, frame: Any) -> None:
         """Draw the machine as it is in the frame."""

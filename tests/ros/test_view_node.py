@@ -83,6 +83,35 @@ def test_inactive_it_takes_nothing_in(port: int) -> None:
     view.close()
 
 
+def test_what_is_no_longer_published_is_no_longer_shown(port: int) -> None:
+    """One topic that falls silent has a dash, all of them are told of; the next run is shown."""
+    view = ViewNode(["--ros-args", "-p", f"port:={port}"])
+    machine, other = Shell("machine", [CYLINDER_STATES]), Shell("other", [PRESSURE_LIFTING])
+    executor = SingleThreadedExecutor()
+    for node in (view, machine, other):
+        executor.add_node(node)
+    deadline, stamps = time.monotonic() + DEADLINE, itertools.count(5_000_000_000, 8_000_000)
+
+    def publish_until(condition: Callable[[], bool], *nodes: Shell) -> None:
+        while not condition():
+            assert time.monotonic() < deadline, (view.note, view.shown)
+            for node in nodes:
+                node.publish_all(next(stamps), SIGNALS)
+            executor.spin_once(timeout_sec=0.02)
+
+    publish_until(lambda: "nothing heard yet" in view.note)
+    publish_until(lambda: "300.0" in view.shown and "110.0" in view.shown, machine, other)
+    assert view.note == ""
+    publish_until(lambda: "| lifting chamber | - |" in view.shown, machine)
+    assert "300.0" in view.shown
+    publish_until(lambda: "nothing heard for" in view.note)
+    assert "300.0" in view.shown  # the last stays
+    stamps = itertools.count(0, 8_000_000)
+    publish_until(lambda: "| time | 0." in view.shown, machine, other)
+    assert view.note == ""
+    view.close()
+
+
 SHOWN = {
     JOINT1: (list(LIVE), {"angle": 0.8, "stroke": 0.3}, "joint angle"),
     ROBOT: (

@@ -34,7 +34,7 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import CONTROL_PERIOD_NS, JOINT_STATES, PLANT_PERIOD_NS, VALVE_COMMAND
 from emir_ros import qos
 from emir_ros.graph import Plan
-from emir_ros.main import keep_out_of_garbage_collection, make_executor
+from emir_ros.main import make_executor, out_of_garbage_collection
 from emir_ros.run import run_plan
 from emir_ros.shell import NodeError
 from emir_ros.start import INTERRUPTED
@@ -181,9 +181,8 @@ def _listen(connection: Connection) -> None:
 
     kind = conversions.message_class(JOINT_STATES.type)
     node.create_subscription(kind, "bench", receive, qos.offered(lockstep=False), raw=True)
-    with make_executor() as executor:
+    with make_executor() as executor, out_of_garbage_collection():
         executor.add_node(node)
-        keep_out_of_garbage_collection()
         while not heard:
             executor.spin_once(timeout_sec=0.1)
         connection.send("heard")

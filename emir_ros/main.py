@@ -66,13 +66,18 @@ def make_executor() -> Iterator[Any]:
         executor.shutdown()
 
 
-def keep_out_of_garbage_collection() -> None:
-    """Let the collector pass over what stands now, for as long as this process lives.
+@contextmanager
+def out_of_garbage_collection() -> Iterator[None]:
+    """Let the collector pass over what stands now.
 
     Going through all of that (libraries, nodes) takes longer than a control period.
     """
     gc.collect()
     gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def spin(executor: Any, node: Shell, ended: Future, stop: StopRequest) -> None:
@@ -139,8 +144,7 @@ def _run(node_class: Callable[[], Shell]) -> int:
             node = node_class()
         with closing(node), make_executor() as executor:
             executor.add_node(node)
-            keep_out_of_garbage_collection()
-            with suppress(KeyboardInterrupt):
+            with out_of_garbage_collection(), suppress(KeyboardInterrupt):
                 spin(executor, node, node.ended, stop)
             node.check()
             take_the_rest(executor, node)

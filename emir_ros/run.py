@@ -33,7 +33,13 @@ from emir_ros.graph import (
     unused,
 )
 from emir_ros.in_turn import spin_in_turn
-from emir_ros.main import make_executor, spin, start_ros, take_the_rest
+from emir_ros.main import (
+    make_executor,
+    out_of_garbage_collection,
+    spin,
+    start_ros,
+    take_the_rest,
+)
 from emir_ros.plant_node import PlantNodeParameters
 from emir_ros.shell import NodeError, Shell, starting
 from emir_ros.start import INTERRUPTED
@@ -186,7 +192,8 @@ def _run_in_one_process(plan: Plan, ros: list[str]) -> None:
             else:
                 for node in nodes.values():
                     executor.add_node(node)
-                spin(executor, plant, ended, stop)
+                with out_of_garbage_collection():
+                    spin(executor, plant, ended, stop)
             for node in nodes.values():
                 node.check()
             take_the_rest(executor, *nodes.values())

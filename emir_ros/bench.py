@@ -45,6 +45,7 @@ Part = tuple[str, list[Figure]]
 
 START = 2.0  # s of simulated time in a short run, whose cost is that of starting and stopping
 RATES = (31.25, 1000.0)  # Hz, at which latency is measured
+PROCESSES = {"one": "one process", "many": "many processes"}
 NUMBER = "position[0]"  # of a JointState's message
 RECORDED_RATE = 25_000.0  # Hz
 SETTLING = 30.0  # s within which two processes have to find each other
@@ -75,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, default, what in (
         ("simulated", 60.0, "simulated time of a run in lock step"),
         ("latency", 10.0, "time for each rate"),
-        ("jitter", 20.0, "time in real time, once unloaded and once loaded"),
+        ("jitter", 20.0, "time of each run in real time, two unloaded and one loaded"),
         ("recorder", 10.0, "time during which messages are sent to the recorder"),
         ("reading", 3.0, "time for each reader"),
     ):
@@ -98,10 +99,12 @@ def _parts(options: argparse.Namespace) -> Iterator[Part]:
         for processes in ("one", "many"):
             yield _lockstep(folder, processes, options.simulated)
         yield from (_latency(rate, options.latency) for rate in RATES)
-        yield "Control period in real time", _jitter(folder / "alone", options.jitter)
+        for processes in ("one", "many"):
+            title = f"Control period in real time, {PROCESSES[processes]}"
+            yield title, _jitter(folder / f"alone-{processes}", processes, options.jitter)
         with _busy_processors():
             title = "The same, a busy process on every processor"
-            figures = _jitter(folder / "loaded", options.jitter)
+            figures = _jitter(folder / "loaded", "many", options.jitter)
         yield title, figures
         yield _recorder(folder / "recorder", options.recorder)
         bag = folder / f"{options.simulated:g}-one"
@@ -118,7 +121,7 @@ def _lockstep(folder: Path, processes: str, simulated: float) -> Part:
         taken.append(time.perf_counter() - begin)
     seconds = taken[2] - taken[1]  # the first run loaded and compiled
     messages = sum(map(len, bags.read(plan.bag).values())) * simulated / (simulated + START)
-    return f"Lock step in {processes} process{'es' if processes == 'many' else ''}, recorded", [
+    return f"Lock step in {PROCESSES[processes]}, recorded", [
         Figure("plant periods of 8 ms", simulated * 1e9 / PLANT_PERIOD_NS / seconds, "1/s"),
         Figure("control periods of 32 ms", simulated * 1e9 / CONTROL_PERIOD_NS / seconds, "1/s"),
         Figure("messages", messages / seconds, "1/s"),
@@ -205,9 +208,9 @@ def _spread(seconds: Array) -> list[Figure]:
     ]
 
 
-def _jitter(bag: Path, seconds: float) -> list[Figure]:
+def _jitter(bag: Path, processes: str, seconds: float) -> list[Figure]:
     """Return how far the control period of the running graph is from 32 ms."""
-    _run(Plan(bag=bag, trajectory="hold", duration=seconds + START, lockstep=False), "many")
+    _run(Plan(bag=bag, trajectory="hold", duration=seconds + START, lockstep=False), processes)
     stamps = _recorded(bag, VALVE_COMMAND.name, NUMBER).stamp
     periods = np.diff(stamps[stamps >= stamps[0] + START * 1e9])  # when everybody has started
     return _spread(np.abs(periods - CONTROL_PERIOD_NS) * 1e-9)

@@ -12,7 +12,14 @@ from emir_analysis.control_protocols import Signals, Topics
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
-from emir_control.lqg import UNMEASURED, Lqg, LqgInputs, LqgOutputs, are_numbers
+from emir_control.lqg import (
+    UNMEASURED,
+    Lqg,
+    LqgInputs,
+    LqgOutputs,
+    PlannedBeside,
+    are_numbers,
+)
 from emir_control.pfc import Pfc, PfcInputs, PfcOutputs
 from emir_control.prefilter import (
     PrefilterParameters,
@@ -248,7 +255,7 @@ class LqgControl:
     )  # fmt: skip
     outputs: ClassVar[Topics] = (LQG_TERMS, VALVE_COMMAND)
     name: ClassVar[str] = "lqg"
-    lqg: Lqg
+    lqg: Lqg | PlannedBeside
 
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state, the command and its terms."""

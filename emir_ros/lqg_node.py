@@ -8,7 +8,7 @@ import scipy.optimize  # noqa: F401 - loaded here, not when the first move is pl
 from emir_analysis.control_protocols import Signals
 from emir_analysis.machine_model import lqg_parameters
 from emir_analysis.node_controls import LqgControl
-from emir_control.lqg import Lqg
+from emir_control.lqg import Lqg, LqgState, PlannedBeside
 from emir_plant.sheet import joint1
 from emir_ros.control_shell import ControlNode
 from emir_ros.main import run
@@ -24,12 +24,23 @@ class LqgNode(ControlNode):
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         kind = self.control_class
         super().__init__(f"{kind.name}_node", kind.inputs, kind.outputs, arguments)
-        law = kind(self.law_class(declare_tree(self, lqg_parameters(joint1()))))
-        self.law = self.standing_by(law)
+        law = self.law_class(declare_tree(self, lqg_parameters(joint1())))
+        self._beside = None if self.lockstep else PlannedBeside(law)
+        self.law = self.standing_by(kind(self._beside or law))
+        self._move_runs = False
         reject_unknown(self)
+
+    def control(self, signals: Signals, dt: float) -> Signals:
+        """Return the output signals of one control period of dt, s."""
+        self._move_runs = 0.0 < signals["move_since"] < signals["move_duration"]
+        return super().control(signals, dt)
 
     def caution(self, outputs: Signals) -> str:
         """Return why the outputs are not what was asked for, if they are not."""
+        if self._beside and self._beside.refused:
+            return self._beside.refused
+        if self._move_runs and isinstance(self.state, LqgState) and not self.state.moving:
+            return "at rest: the move had begun before"
         limited = outputs[f"{self.control_class.name}_limited"] == 1.0
         return "held off the end of the stroke" if limited else ""
 

@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from emir_common.quantity import ParameterError
+from emir_control.least_bending import NoMotionError
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import JOINT1, ROBOT, Topic
 from emir_plant.plant import SimulationError
@@ -34,8 +35,8 @@ class NodeError(RuntimeError):
     """A node cannot go on; the message is one line."""
 
 
-Failure = NodeError | ParameterError | SimulationError
-FAILURES = (NodeError, ParameterError, SimulationError)
+Failure = NodeError | ParameterError | SimulationError | NoMotionError
+FAILURES = (NodeError, ParameterError, SimulationError, NoMotionError)
 
 
 class Shell(LifecycleNode):
@@ -213,7 +214,7 @@ class Shell(LifecycleNode):
             self._fail(error)
 
     def _fail(self, error: Failure) -> None:
-        if isinstance(error, SimulationError):  # which knows of no nodes
+        if isinstance(error, SimulationError | NoMotionError):  # which know of no nodes
             error = NodeError(f"{self.get_name()}: {error}")
         self.failure = self.failure or error
         self.end()

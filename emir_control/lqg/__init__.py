@@ -12,6 +12,7 @@ when it acts: those measured, led on by the commands under way and the plan.
 
 from emir_control.lqg.law import Lqg, Now
 from emir_control.lqg.parameters import LqgParameters
+from emir_control.lqg.planned_beside import PlannedBeside
 from emir_control.lqg.state import UNMEASURED, LqgInputs, LqgOutputs, LqgState, are_numbers
 
 __all__ = [
@@ -22,5 +23,6 @@ __all__ = [
     "LqgParameters",
     "LqgState",
     "Now",
+    "PlannedBeside",
     "are_numbers",
 ]

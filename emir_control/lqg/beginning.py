@@ -17,6 +17,8 @@ from emir_control.regulator import regulator
 from emir_control.spool_play import Sent
 from emir_control.trajectory import NO_MOVE, Move
 
+ASTRAY = 0.01  # m, of the stroke off its reference: then all begins where the machine is
+
 
 @dataclass(frozen=True)
 class Beginning:
@@ -86,9 +88,11 @@ class Beginning:
         linkage = p.actuator.static
         ends = inputs.reference, inputs.reference + move.distance
         here, end = self.off_the_ends(rest, ends)
-        start, cut = here, (here, end) != ends
-        if filled.moved:
-            start = piston_stroke(rest.angle, linkage)
+        cut = (here, end) != ends
+        actual = piston_stroke(rest.angle, linkage)
+        if abs(actual - here) > ASTRAY:
+            here = actual
+        start = actual if filled.moved else here
         move = move._replace(distance=end - start if move.distance else 0.0)
         angle = joint_angle(here, linkage)
         payload = self._payload(rest.force, angle)

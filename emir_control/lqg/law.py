@@ -104,6 +104,38 @@ class Lqg:
         """
         return self._standing_by.step(state, inputs)
 
+    def plans(self, state: LqgState, inputs: LqgInputs) -> bool:
+        """Tell whether the move is to be planned in this step.
+
+        One that had begun without this controller is not: nobody knows how far it has come.
+        """
+        return self.is_asked(state, inputs) and inputs.move.since <= self.parameters.period
+
+    def is_asked(self, state: LqgState, inputs: LqgInputs) -> bool:
+        """Tell whether a move is to be made that has no plan."""
+        return self._beginning.under_way(inputs.move) and not (state.moving or state.joins)
+
+    def planned(self, state: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state with the plan for the move that comes.
+
+        Raises NoMotionError where the drive cannot make it.
+        """
+        if state.filled.over:
+            return self._filling.onward(state, inputs)
+        return self._beginning.begun(state.rest, inputs, state.logic, state.sent, state.filled)
+
+    def continued(self, planned: LqgState, now: LqgState, inputs: LqgInputs) -> LqgState:
+        """Return the state that makes a move planned some periods ago; now: the state at rest.
+
+        Where the plan comes after its first command is due, it is led on from where all is now.
+        """
+        if inputs.move.since > self._begins:
+            return self._standing_by.joined(now, inputs)
+        planned = planned._replace(logic=now.logic, sent=now.sent)
+        if now.filled.over:  # the boom swings from the filling
+            return planned._replace(estimate=now.estimate, past=now.past, openings=now.openings)
+        return planned
+
     @property
     def _begins(self) -> float:
         """When the plan's first command has to be given, s since the move's start."""
@@ -113,13 +145,11 @@ class Lqg:
         """Return the state with a plan for the move that begins, or the rest's means."""
         if state.joins:
             return self._standing_by.joined(state, inputs)
-        if not self._beginning.under_way(inputs.move):
-            return self._beginning.rested(state, inputs)
-        if state.moving:
+        if self.plans(state, inputs):
+            return self.planned(state, inputs)
+        if state.moving and self._beginning.under_way(inputs.move):
             return state
-        if state.filled.over:
-            return self._filling.onward(state, inputs)
-        return self._beginning.begun(state.rest, inputs, state.logic, state.sent, state.filled)
+        return self._beginning.rested(state, inputs)
 
     def _waiting(self, state: LqgState, inputs: LqgInputs) -> tuple[LqgState, LqgOutputs]:
         """Return the shut valve of a move that is planned and has not begun."""

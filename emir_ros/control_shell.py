@@ -1,8 +1,9 @@
 """What every control node shares: its inputs with their age, and when it acts on them.
 
-Real time: a timer starts each control period, which takes the latest inputs. Lock step: a
-control period starts when all inputs with the stamp of that period are there, so the graph
-runs as fast as it can and the result does not depend on how fast that is.
+Real time: a timer starts each control period, which takes the latest inputs; who hands a command
+on starts one when that command comes, since a timer of its own would delay it by up to a period.
+Lock step: a control period starts when all inputs with the stamp of that period are there, so the
+graph runs as fast as it can and the result does not depend on how fast that is.
 """
 
 import math
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from rclpy.time import Time
 
 LONGEST_TIMEOUT = 60.0  # s
+OVERDUE = 1.5  # periods without what is followed, after which a node acts without
 
 
 def is_saturated(signals: Mapping[str, float]) -> bool:
@@ -92,6 +94,8 @@ class ControlNode(Shell):
         self.orders = Orders(self)
         if not self.lockstep:
             self._beat = Beat(self._period * 1e-9)
+            # s, when it acted last on what it follows, and when it is to act next
+            self._followed = self._due = -math.inf
             self._shown: Signals = {}
             self.diagnostics.figures = self._figures
             self.start_timer(self._period * 1e-9, self._on_timer)
@@ -150,6 +154,10 @@ class ControlNode(Shell):
         """Return the names of the inputs without which there is no period in real time."""
         return self._inputs.keys() - {SELECTOR_TERMS.name}
 
+    def followed(self) -> str | None:
+        """Return the name of the input on whose arrival the node acts in real time; None: none."""
+        return None
+
     def take(self, topic: Topic, later: int = 0) -> None:
         """Take a topic as an input, in lock step of the period that begins `later` ns after it."""
         self._inputs[topic.name] = topic
@@ -158,6 +166,8 @@ class ControlNode(Shell):
 
         def receive_latest(data: bytes) -> None:
             self._latest[topic.name] = (self.get_clock().now(), wire.decode(data))
+            if topic.name == self.followed():
+                self._act_in_turn()
 
         def receive_all(data: bytes) -> None:
             stamp = stamp_ns(data)
@@ -186,6 +196,19 @@ class ControlNode(Shell):
         return len(self._inputs) if stamp % CONTROL_PERIOD_NS == 0 else self._fast_inputs
 
     def _on_timer(self) -> None:
+        since = self.seconds() - self._followed
+        if not 0.0 <= since < OVERDUE * self._period * 1e-9:
+            self._due = self.seconds()
+            self._act()
+
+    def _act_in_turn(self) -> None:
+        """Act, unless that is more than a period early: not more often than commands are due."""
+        period, now = self._period * 1e-9, self.seconds()
+        if now >= self._due - period:
+            self._followed, self._due = now, max(self._due, now) + period
+            self._act()
+
+    def _act(self) -> None:
         now = self.get_clock().now()
         self._beat.tick(self.seconds())
         missing = self.missing()

@@ -8,7 +8,13 @@ from emir_analysis.node_controls import ForceLoopControl, force_loop_signals
 from emir_analysis.robot_controls import RobotForceLoopControl, shut_signals
 from emir_analysis.robot_setup import force_loops
 from emir_control.force_loop import ForceLoop, ForceLoopOutputs, ForceLoopParameters
-from emir_msgs_py.topics import CONTROL_PERIOD, PLANT_PERIOD, ROBOT, SELECTOR_TERMS
+from emir_msgs_py.topics import (
+    CONTROL_PERIOD,
+    PLANT_PERIOD,
+    ROBOT,
+    SELECTOR_TERMS,
+    VELOCITY_COMMAND,
+)
 from emir_ros.control_shell import ControlNode
 from emir_ros.live_parameters import LiveParameters
 from emir_ros.main import run
@@ -48,6 +54,10 @@ class ForceLoopNode(ControlNode):
         reject_unknown(self)
         if not self.lockstep:
             self.start_timer(PLANT_PERIOD, self._watch)
+
+    def followed(self) -> str | None:
+        """Return the name of the velocity command; joint by joint it acts more often than that."""
+        return None if self.model == ROBOT else VELOCITY_COMMAND.name
 
     def _watch(self) -> None:
         missing = self.missing()

@@ -1,5 +1,8 @@
 """mpc_node: constrained predictive control of the boom about a planned move, on OSQP."""
 
+from collections.abc import Sequence
+from importlib import import_module
+
 from emir_analysis.node_controls import MpcControl
 from emir_control.mpc import Mpc
 from emir_ros.lqg_node import LqgNode
@@ -11,6 +14,10 @@ class MpcNode(LqgNode):
 
     control_class = MpcControl
     law_class = Mpc
+
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        super().__init__(arguments)
+        import_module("osqp")  # takes half a second, here and not within the first move
 
 
 def main() -> None:

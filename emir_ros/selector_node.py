@@ -50,6 +50,10 @@ class SelectorNode(ControlNode):
         """Return who drives."""
         return self.state.drives if self.state else self.law.first
 
+    def followed(self) -> str:
+        """Return the name of the command that is handed on."""
+        return OFFERED_COMMANDS[self.chosen].name
+
     def stale(self, missing: Sequence[str]) -> None:
         """Publish nothing; who was chosen stays so."""
 

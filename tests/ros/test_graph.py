@@ -412,9 +412,11 @@ def test_schema_text_is_the_one_that_ros_distributes(tmp_path: Path) -> None:
         assert type_hash(name) == store.hash_rihs01(name)
 
 
-def test_real_time_graph_controls_the_machine(tmp_path: Path) -> None:
+@pytest.mark.parametrize("controller", ["cascade", "lqg"])
+def test_real_time_graph_controls_the_machine(controller: str, tmp_path: Path) -> None:
     bag = tmp_path / "run"
-    finished = _emir_run(["--realtime", "--duration", "3", "--bag", str(bag)])
+    words = ["--realtime", "--controller", controller, "--duration", "3"]
+    finished = _emir_run([*words, "--bag", str(bag)])
     assert finished.returncode == 0, finished.stderr
     recorded = _read_with_rosbags(bag)
     stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
@@ -565,6 +567,21 @@ BAD = {
         "params.yaml: plant_node: at 0.0 deg the boom needs",
     ),
 }
+
+
+@pytest.mark.parametrize("controller", ["lqg", "mpc"])
+def test_a_move_that_the_drive_cannot_make_is_one_clear_line(
+    controller: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if controller == "mpc":
+        pytest.importorskip("osqp", reason="OSQP is missing: pip install 'emir_ros[mpc]'")
+    file, bag = tmp_path / "params.yaml", tmp_path / "run"
+    file.write_text("trajectory_node: {ros__parameters: {distance: 0.2, speed: 0.2, ramp: 0.2}}")
+    words = ["--controller", controller, "--params", str(file), "--duration", "3"]
+    assert run_graph([*words, "--bag", str(bag)]) == 1
+    said = [line for line in capfd.readouterr().err.splitlines() if "emir run" in line]
+    assert len(said) == 1
+    assert f"{controller}_node: no motion turns the joint by" in said[0]
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -330,7 +330,7 @@ def test_lqg_says_that_it_is_held_off_the_end_of_the_stroke(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Standing at the end, told of a move beyond it: planned to stay, and said."""
-    with _graph(LqgNode) as graph:
+    with _graph(lambda: LqgNode(LOCKSTEP), lockstep=True) as graph:
         node = graph.nodes[1]
         assert isinstance(node, LqgNode)
         said: list[tuple[Level, str]] = []

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
     JOINT_STATES,
+    OFFERED_COMMANDS,
     PLANT_PERIOD_NS,
     PRESSURE_LIFTING,
     PRESSURE_LOWERING,
@@ -36,11 +37,15 @@ from emir_msgs_py.topics import (
 )
 from emir_ros import qos
 from emir_ros.force_loop_node import TIMEOUT, ForceLoopNode
+from emir_ros.selector_node import SelectorNode
 
 HOUR = 3600 * 1_000_000_000
-INPUTS = (VELOCITY_COMMAND, JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING)
+SENSORS = (JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING)
+INPUTS = (VELOCITY_COMMAND, *SENSORS)
+OFFERED = OFFERED_COMMANDS["cascade"]
 SIGNALS = {
     "velocity_command": 0.02,
+    "cascade_command": 0.02,
     "angle": 0.8,
     "pressure_lifting": 1e7,
     "pressure_lowering": 2e6,
@@ -50,8 +55,11 @@ SIGNALS = {
 class Bench:
     """The force loop on a test bench: time and inputs are given to it, its commands heard."""
 
-    def __init__(self) -> None:
+    def __init__(self, command: Topic = VELOCITY_COMMAND, before: Sequence[Node] = ()) -> None:
+        """command: what it is given; before: nodes that make its command of that."""
         self.loop = ForceLoopNode(SIM_TIME)
+        self._nodes = [self.loop, *before]
+        self.inputs = (command, *SENSORS)
         self.node = Node("bench")
         self.valve: list[float] = []
         profile = qos.offered(lockstep=False)
@@ -59,12 +67,12 @@ class Bench:
             topic.name: self.node.create_publisher(
                 conversions.message_class(topic.type), topic.name, profile
             )
-            for topic in INPUTS
+            for topic in self.inputs
         }
         kind = conversions.message_class(VALVE_COMMAND.type)
         self.node.create_subscription(kind, VALVE_COMMAND.name, self._on_valve, profile)
         self._executor = SingleThreadedExecutor()
-        for node in (self.loop, self.node):
+        for node in (*self._nodes, self.node):
             self._executor.add_node(node)
         self._clock = SimClock(self.node, self._executor)
         self.until(self._connected)
@@ -82,10 +90,10 @@ class Bench:
             assert time.monotonic() < deadline
             self._executor.spin_once(timeout_sec=0.01)
 
-    def tick(self, inputs: Any = INPUTS, step: int = PLANT_PERIOD_NS) -> None:
-        """Let time go on by a step, ns, and then give the inputs."""
-        self._clock.advance([self.loop], step)
-        for topic in inputs:
+    def tick(self, inputs: Any = None, step: int = PLANT_PERIOD_NS) -> None:
+        """Let time go on by a step, ns, and then give the inputs, all unless said otherwise."""
+        self._clock.advance(self._nodes, step)
+        for topic in self.inputs if inputs is None else inputs:
             self._inputs[topic.name].publish(conversions.message(topic, self._clock.now, SIGNALS))
         self._clock.settle()
 
@@ -118,15 +126,19 @@ def test_one_message_in_twenty_lost_changes_nothing(bench: Bench) -> None:
     assert min(bench.valve[before:]) > 0.0
 
 
-def test_a_command_is_acted_on_when_it_comes(bench: Bench) -> None:
-    """A timer of its own would delay it by up to a period."""
-    others = [topic for topic in INPUTS if topic is not VELOCITY_COMMAND]
+@pytest.mark.parametrize("command", [VELOCITY_COMMAND, OFFERED], ids=lambda topic: topic.name)
+def test_a_command_is_acted_on_when_it_comes(command: Topic, ros: None) -> None:
+    """Also by way of the selector: timers on the way would delay it by up to a period each."""
+    chosen = [*SIM_TIME, "-p", "controllers:=[cascade]"]
+    bench = Bench(command, [SelectorNode(chosen)] if command is OFFERED else [])
+    bench.settle()
     acted = np.zeros((10, 4), dtype=int)
     for k in range(acted.size):
         before = len(bench.valve)
-        bench.tick(INPUTS if k % 4 == 1 else others)
+        bench.tick(bench.inputs if k % 4 == 1 else SENSORS)
         acted[k // 4, k % 4] = len(bench.valve) - before
-    assert np.array_equal(acted[2:], np.tile([0, 1, 0, 0], (8, 1)))
+    # first it was given more commands than are due
+    assert np.array_equal(acted[4:], np.tile([0, 1, 0, 0], (6, 1)))
 
 
 def test_commands_late_by_100_ms_shut_the_valve_and_open_it_when_they_come(bench: Bench) -> None:

@@ -204,7 +204,7 @@ class PlantNode(Shell):
     def _fresh_command(self) -> Signals:
         if self._command is None:
             return self._shut
-        if self.seconds() - self._command_received > self.own.command_timeout:
+        if not 0.0 <= self.seconds() - self._command_received <= self.own.command_timeout:
             self.diagnostics.say(Level.ERROR, f"valve shut: no fresh {self._valves.name}")
             return self._shut
         return self._command[1]

@@ -40,7 +40,8 @@ class LqgNode(ControlNode):
         if self._beside and self._beside.refused:
             return self._beside.refused
         if self._move_runs and isinstance(self.state, LqgState) and not self.state.moving:
-            return "at rest: the move had begun before"
+            planning = self._beside is not None and self._beside.is_planning
+            return f"at rest: the move {'is being planned' if planning else 'had begun before'}"
         limited = outputs[f"{self.control_class.name}_limited"] == 1.0
         return "held off the end of the stroke" if limited else ""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.util import find_spec
 
 from emir_analysis.node_controls import MpcControl
 from emir_control.mpc import Mpc
@@ -16,8 +17,9 @@ class MpcNode(LqgNode):
     law_class = Mpc
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        if find_spec("osqp"):  # else the law says what is missing
+            import_module("osqp")  # takes half a second, here and not within the first move
         super().__init__(arguments)
-        import_module("osqp")  # takes half a second, here and not within the first move
 
 
 def main() -> None:

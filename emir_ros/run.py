@@ -46,7 +46,8 @@ from emir_ros.start import INTERRUPTED
 
 DEFAULT_TRAJECTORY = "lift-lower"
 TRAJECTORIES = "lift-lower, lower-lift, hold; of the robot also line"
-GRACE = 10.0  # s that a node has to end before it is killed
+GRACE = 10.0  # s that a node has to come up, or to end before it is killed
+FIRST_TO_ACT = "trajectory_node"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -220,7 +221,9 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     processes: dict[str, subprocess.Popen[bytes]] = {}
     try:
-        for name in plan.nodes:
+        for name in sorted(plan.nodes, key=lambda name: name == FIRST_TO_ACT):
+            if name == FIRST_TO_ACT and not plan.lockstep:
+                _wait_for_nodes(processes)
             command = [sys.executable, "-P", "-m", "emir_ros.start", name, *ros]
             processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
         _wait_for_plant(processes)
@@ -229,6 +232,25 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
         _stop(processes.values())
         if recorder is not None:  # the last one, since it hears all the others
             _stop([recorder])
+
+
+def _wait_for_nodes(processes: dict[str, subprocess.Popen[bytes]]) -> None:
+    """Return when all are there, or one has ended already, which is then told of.
+
+    In real time the first move begins a second after the trajectory does: who comes up later than
+    that, as it loads more, would miss it.
+    """
+    context, until = rclpy.Context(), time.monotonic() + GRACE
+    rclpy.init(context=context)
+    node = rclpy.create_node("emir_run", context=context)
+    try:
+        while time.monotonic() < until and not processes.keys() <= set(node.get_node_names()):
+            if any(process.poll() is not None for process in processes.values()):
+                break
+            time.sleep(0.02)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
 
 
 def _wait_for_plant(processes: dict[str, subprocess.Popen[bytes]]) -> None:

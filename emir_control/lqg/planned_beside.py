@@ -32,6 +32,11 @@ class PlannedBeside:
         """Return the law's parameters."""
         return self._law.parameters
 
+    @property
+    def is_planning(self) -> bool:
+        """Tell whether a plan is being made."""
+        return self._asked is not None
+
     def initial(self, inputs: LqgInputs) -> LqgState:
         """Return the state of a machine that rests with what is measured now, all numbers."""
         return self._law.initial(inputs)
@@ -62,5 +67,5 @@ class PlannedBeside:
 
     def _is_wanted(self, state: LqgState, inputs: LqgInputs) -> bool:
         """Tell whether a move is to be planned, or is being planned and has begun meanwhile."""
-        waits = self._asked is not None and self._law.is_asked(state, inputs)
+        waits = self.is_planning and self._law.is_asked(state, inputs)
         return waits or self._law.plans(state, inputs)

@@ -20,6 +20,7 @@ from mcap.reader import make_reader
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import rclpy
+from rclpy.node import Node
 from refused import refusal
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosReliability
@@ -61,6 +62,7 @@ from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
 from emir_ros.graph import Plan, duration, read_parameters, ros_arguments
 from emir_ros.plant_node import PlantNode
+from emir_ros.run import _wait_for_nodes
 from emir_ros.run import main as run_graph
 from emir_ros.run_parameters import reaches
 
@@ -448,6 +450,32 @@ def test_the_garbage_collector_passes_over_the_libraries_of_a_run_in_real_time(
     assert run_graph(words) == 0
     assert seen[0] < 0.1 * before
     assert gc.get_freeze_count() == 0  # the process may have more to do
+
+
+class Starting:
+    """Stands for a process that takes its time to bring its node up, or has ended."""
+
+    def __init__(self, name: str, code: int | None = None) -> None:
+        self.looked_at = 0
+        self._name, self._code = name, code
+        self._up: list[Node] = []
+
+    def poll(self) -> int | None:
+        """Return the exit code; the third time the node is up."""
+        self.looked_at += 1
+        if self.looked_at == 3:
+            self._up.append(Node(self._name))
+        return self._code
+
+
+@pytest.mark.usefixtures("ros")
+def test_in_real_time_the_trajectory_begins_when_all_others_are_there() -> None:
+    late = Starting("late_node")
+    _wait_for_nodes({"late_node": late})
+    assert late.looked_at >= 3
+    dead = Starting("dead_node", code=1)
+    _wait_for_nodes({"dead_node": dead})
+    assert dead.looked_at == 1
 
 
 @pytest.mark.parametrize("victim", ["cascade_node", "recorder_node", "plant_node"])

@@ -48,7 +48,9 @@ class PlannedBeside:
     def step(self, state: LqgState, inputs: LqgInputs, dt: float) -> tuple[LqgState, LqgOutputs]:
         """Return the valve command of this control period of dt, s."""
         law, resting = self._law, inputs._replace(move=NO_MOVE)
-        if not (are_numbers(inputs) and self._is_wanted(state, inputs)):
+        if not are_numbers(inputs):
+            return law.step(state, inputs, dt)
+        if not self._is_wanted(state, inputs):
             self._asked, self.refused = None, ""
             return law.step(state, inputs, dt)
         asked = (inputs.move.distance, inputs.move.duration)

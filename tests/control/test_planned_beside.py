@@ -62,6 +62,16 @@ def test_a_plan_that_comes_late_leads_on_from_where_the_machine_is() -> None:
     assert abs(outputs.planned) < 0.01  # it begins gently
 
 
+def test_a_number_that_is_none_meanwhile_does_not_lose_the_move() -> None:
+    beside, first = PlannedBeside(LAW), _inputs(-0.6)
+    state, _ = beside.step(_rested(first), first, PERIOD)
+    state, outputs = beside.step(state, _inputs(-0.5)._replace(angle=math.nan), PERIOD)
+    assert outputs.valve_command == 0.0
+    _wait_for_plan(beside)
+    state, _ = beside.step(state, _inputs(0.2), PERIOD)
+    assert state.moving
+
+
 def test_another_move_asked_for_meanwhile_is_the_one_that_is_made() -> None:
     beside, first = PlannedBeside(LAW), _inputs(-0.6)
     state, _ = beside.step(_rested(first), first, PERIOD)

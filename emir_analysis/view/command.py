@@ -70,6 +70,7 @@ def start_server(port: int) -> "viser.ViserServer":
     except ImportError:
         raise InputError("needs viser: pip install 'emir_ros[view]'") from None
     with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a page just closed is no one
         try:
             probe.bind((HOST, port))
         except (OSError, OverflowError) as error:

@@ -10,6 +10,7 @@ from viser import uplot
 
 MOST_POINTS = 1000  # of a plot's line: a screen has not many more
 FAINT = "#b7c0c8"
+MARGIN = 0.05  # of a plot's height, above and below its lines
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,13 @@ class Page:
             for name, _, factor, _ in chart.lines:
                 value = columns[name] * factor
                 data += [value, np.where(past, value, np.nan)]
+            shown = (float(data[0][0]), float(data[0][-1]))
+            scales = {
+                "x": uplot.Scale(time=False, range=shown),
+                "y": uplot.Scale(range=span(data[1::2])),
+            }
+            if scales != handle.scales:  # with another range the plot is begun anew
+                handle.scales = scales
             handle.data = tuple(data)
 
     def _add_chart(self, server: viser.ViserServer, chart: Chart) -> viser.GuiUplotHandle:
@@ -101,6 +109,20 @@ class Page:
             empty, tuple(series), title=chart.title, aspect=2.2,
             scales={"x": uplot.Scale(time=False)}, legend=uplot.Legend(show=False),
         )  # fmt: skip
+
+
+def span(lines: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Return what of the vertical axis lines, (n,) each, take with their margin.
+
+    uPlot itself would find none where one of them begins with a nan.
+    """
+    known = np.concatenate(lines)
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    room = MARGIN * (high - low) or 1.0
+    return low - room, high + room
 
 
 def table(readings: Sequence[tuple[str, float, str, int]]) -> str:

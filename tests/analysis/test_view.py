@@ -21,7 +21,7 @@ from emir_analysis.cli import main
 from emir_analysis.run_signals import load_run
 from emir_analysis.view.arm import Outline, centreline, cylinder
 from emir_analysis.view.frames import Frame, frames, tcp_deflection
-from emir_analysis.view.page import table
+from emir_analysis.view.page import span, table
 from emir_analysis.view.robot import JOINTS, SIGNALS, bent_line, robot_frame
 from emir_analysis.view.robot import centreline as robot_centreline
 from emir_analysis.view.subject import robot_subject, subject_of_joint1
@@ -143,6 +143,18 @@ def test_scrubbing_shows_the_recording(address: str) -> None:
         view.get_by_text("play", exact=True).click()
         view.locator("td", has_text=re.compile(r"^3\.20$")).wait_for()  # to the end
         assert _cell(view, "stroke") == pytest.approx(shown[-1].stroke * 1e3, abs=0.06)
+
+
+def test_a_plots_height_is_that_of_what_is_known() -> None:
+    """A signal that begins late, or never comes, hides no other one."""
+    late, never = np.array([math.nan, 3.0, 5.0]), np.full(3, math.nan)
+    low, high = span([late, never, np.array([1.0, 2.0, 3.0])])
+    assert 0.5 < low < 1.0
+    assert 5.0 < high < 5.5
+    low, high = span([np.full(3, 2.0)])
+    assert low < 2.0 < high
+    low, high = span([never])
+    assert low < high
 
 
 def test_bad_input_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> None:

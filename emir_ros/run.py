@@ -235,7 +235,7 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
 
 
 def _wait_for_nodes(processes: dict[str, subprocess.Popen[bytes]]) -> None:
-    """Return when all are there, or one has ended already, which is then told of.
+    """Return when all are there, after GRACE at most, or when one has ended: that is told of then.
 
     In real time the first move begins a second after the trajectory does: who comes up later than
     that, as it loads more, would miss it.

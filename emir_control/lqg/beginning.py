@@ -17,7 +17,9 @@ from emir_control.regulator import regulator
 from emir_control.spool_play import Sent
 from emir_control.trajectory import NO_MOVE, Move
 
-ASTRAY = 0.01  # m, of the stroke off its reference: then all begins where the machine is
+# m, of the stroke off its reference: some mm are left at rest and made good with the move; from
+# further off a plan begins where the machine is
+ASTRAY = 0.01
 
 
 @dataclass(frozen=True)

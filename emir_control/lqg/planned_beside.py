@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from emir_control.least_bending import NoMotionError
 from emir_control.lqg.law import Lqg
 from emir_control.lqg.parameters import LqgParameters
+from emir_control.lqg.standing_by import TO_JOIN
 from emir_control.lqg.state import LqgInputs, LqgOutputs, LqgState, are_numbers
 from emir_control.trajectory import NO_MOVE
 
@@ -17,7 +18,7 @@ class PlannedBeside:
     """A control law with its plans made beside; see `Lqg`.
 
     A move that the drive cannot make is not made: `refused` says why, for as long as it is asked
-    for.
+    for. Nor is one made whose plan comes within TO_JOIN of its end.
     """
 
     def __init__(self, law: Lqg) -> None:
@@ -68,6 +69,8 @@ class PlannedBeside:
         return law.step(law.continued(planned, state, inputs), inputs, dt)
 
     def _is_wanted(self, state: LqgState, inputs: LqgInputs) -> bool:
-        """Tell whether a move is to be planned, or is being planned and has begun meanwhile."""
-        waits = self.is_planning and self._law.is_asked(state, inputs)
-        return waits or self._law.plans(state, inputs)
+        """Tell whether a move is to be planned, or has begun meanwhile with time to join it."""
+        move = inputs.move
+        in_time = self.refused or move.since < move.duration - TO_JOIN
+        waits = self.is_planning and in_time and self._law.is_asked(state, inputs)
+        return bool(waits) or self._law.plans(state, inputs)

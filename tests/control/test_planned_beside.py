@@ -62,6 +62,16 @@ def test_a_plan_that_comes_late_leads_on_from_where_the_machine_is() -> None:
     assert abs(outputs.planned) < 0.01  # it begins gently
 
 
+def test_a_plan_that_comes_at_the_moves_end_is_not_made() -> None:
+    beside, first = PlannedBeside(LAW), _inputs(-0.6)
+    state, _ = beside.step(_rested(first), first, PERIOD)
+    _wait_for_plan(beside)
+    for late in (DURATION - 0.9, DURATION + 0.7):
+        state, outputs = beside.step(state, _inputs(late), PERIOD)
+        assert not state.moving
+        assert outputs.valve_command == 0.0
+
+
 def test_a_number_that_is_none_meanwhile_does_not_lose_the_move() -> None:
     beside, first = PlannedBeside(LAW), _inputs(-0.6)
     state, _ = beside.step(_rested(first), first, PERIOD)

@@ -417,20 +417,19 @@ def test_schema_text_is_the_one_that_ros_distributes(tmp_path: Path) -> None:
 @pytest.mark.parametrize("controller", ["cascade", "lqg"])
 def test_real_time_graph_controls_the_machine(controller: str, tmp_path: Path) -> None:
     bag = tmp_path / "run"
-    words = ["--realtime", "--controller", controller, "--duration", "3"]
+    words = ["--realtime", "--controller", controller, "--duration", "4"]
     finished = _emir_run([*words, "--bag", str(bag)])
     assert finished.returncode == 0, finished.stderr
     recorded = _read_with_rosbags(bag)
     stroke = [m.position[0] for _, m in recorded["/truth"]]  # type: ignore[attr-defined]
-    # Of 377: the computer may be busy, its timer then comes twice in a period; it does not go on.
-    assert 150 < len(stroke) < 400
+    # Of 502: the computer may be busy, its timer then comes twice in a period; it does not go on.
+    assert 200 < len(stroke) < 530
     periods = np.diff([log_time for log_time, _ in recorded["/valve_command"]])
     assert np.median(periods) == pytest.approx(CONTROL_PERIOD_NS, rel=0.05)
     strokes = [
         conversions.values(by_name("truth"), m)["true_stroke"] for _, m in recorded["/truth"]
     ]
-    # it has begun to lift, by 35 mm unless the valve shuts now and then on a busy computer
-    assert strokes[-1] - strokes[0] > 0.001
+    assert strokes[-1] - strokes[0] > 0.005  # it has begun to lift
 
 
 def test_the_garbage_collector_passes_over_the_libraries_of_a_run_in_real_time(

@@ -7,7 +7,6 @@ Delay line and play of the valve are no differential equations and are carried f
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +36,7 @@ from emir_plant.core import (
 )
 from emir_plant.effects import backlash, command_delay, terms, valve_hysteresis
 from emir_plant.hydraulics import chambers
-from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
+from emir_plant.jit import compiled, compiled_in_place, on_all_cores
 
 STEP = 1e-3  # s, integration step: a tenth of the fastest oscillation kept (63 Hz) and less
 SETTLING = 2.0  # of play and oil in a step; Runge-Kutta 4 is unstable above 2.8
@@ -89,7 +88,6 @@ def step(x: Array, command: float, dt: float, parameters: NDArray[Any]) -> tuple
     return after, truth(after, parameters)
 
 
-@compiled
 def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
     x: Array,
     commands: Array,
@@ -109,7 +107,6 @@ def simulate(  # noqa: PLR0913, PLR0917 (as _advance)
     return result
 
 
-@compiled_parallel
 def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
     starts: Array,
     commands: Array,
@@ -126,9 +123,12 @@ def simulate_each(  # noqa: PLR0913, PLR0917 (as _advance)
     machines = parameters.size
     states, work = starts.copy(), np.zeros((machines, 5, starts.shape[1]))
     result = np.empty((machines, 1 + commands.size // every, COLUMNS))
-    for m in numba.prange(machines):
+
+    def run(m: int) -> None:
         own = parameters[m : m + 1]
         _simulate(states[m], commands, dt, every, own, step, work[m], result[m])
+
+    on_all_cores(run, machines)
     return result
 
 

@@ -7,6 +7,7 @@ files (one effect, one file), so the cache folder carries a digest of all of the
 import hashlib
 import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -38,23 +39,28 @@ def compiled_in_place(function: Function) -> Function:
     """As `compiled`, for a function that creates no arrays but works on those it is given.
 
     Who holds an array is not counted then. Counting takes a third of a step of joint 1, since the
-    compiler cannot see through so large a function that every count is taken back.
+    compiler cannot see through so large a function that every count is taken back. Called from
+    Python it leaves the interpreter's lock to others, so that threads run it side by side.
     """
     decorate = numba.njit(  # type: ignore[call-overload]  # numba's stubs leave out its last option
-        cache=True, error_model="numpy", forceinline=True, _nrt=False
+        cache=True, error_model="numpy", forceinline=True, nogil=True, _nrt=False
     )
     return cast("Function", decorate(function))
 
 
-def compiled_parallel(function: Function) -> Function:
-    """As `compiled`, with the loops written as `numba.prange` run on all cores."""
-    decorate = numba.njit(cache=True, error_model="numpy", parallel=True)
-    return cast("Function", decorate(function))
+def on_all_cores(work: Callable[[int], None], number: int) -> None:
+    """Call work(0) ... work(number - 1), as many at a time as numba is set to have threads.
 
-
-def compiled_for_threads(function: Function) -> Function:
-    """As `compiled`, run without the interpreter's lock, so that threads run it side by side."""
-    return cast("Function", numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    By threads of Python and not by numba's own loop: that has the compiler go through everything
+    in it three times more, which was a third of a first start. Raises what `work` raises.
+    """
+    threads = min(number, numba.get_num_threads())
+    if threads <= 1:
+        for i in range(number):
+            work(i)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, range(number)))  # the list, so that it raises
 
 
 @intrinsic

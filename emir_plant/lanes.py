@@ -9,13 +9,12 @@ one by one.
 import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant import core, integration
 from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, Array
-from emir_plant.jit import compiled_in_place, compiled_parallel
+from emir_plant.jit import compiled_in_place, on_all_cores
 from emir_plant.lane import lane
 from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
 
@@ -39,8 +38,14 @@ def simulate_many(  # noqa: PLR0913, PLR0917 (as integration.simulate)
     """
     if len(starts) < LANES or any(parameters[name].any() for name in EFFECT_SIZES):
         return integration.simulate_each(starts, commands, dt, every, parameters, step)
-    found = _simulate(_side_by_side(starts, parameters), commands, dt, every, step)
-    return found[: len(starts)]
+    groups = _side_by_side(starts, parameters)
+    found = np.empty((groups.size, LANES, 1 + commands.size // every, COLUMNS))
+
+    def run(group: int) -> None:
+        _simulate(groups[group : group + 1], commands, dt, every, step, found[group])
+
+    on_all_cores(run, groups.size)
+    return found.reshape(-1, *found.shape[2:])[: len(starts)]
 
 
 def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
@@ -94,20 +99,19 @@ def _step(m: Any, command: float, h: float) -> None:
         x[i] = max(x[i], 0.0)  # p_H and p_S
 
 
-@compiled_parallel
-def _simulate(machines: NDArray[Any], commands: Array, dt: float, every: int, step: float) -> Array:
-    """Return (groups * LANES, 1 + k // every, COLUMNS)."""
+@compiled_in_place
+def _simulate(  # noqa: PLR0913, PLR0917 (as integration.simulate)
+    group: NDArray[Any], commands: Array, dt: float, every: int, step: float, result: Array
+) -> None:
+    """Write the truths of one group, (1,), to result, (LANES, 1 + k // every, COLUMNS)."""
     steps = max(1, math.ceil(dt / step - 1e-9))
-    result = np.empty((machines.size * LANES, 1 + commands.size // every, COLUMNS))
-    for group in numba.prange(machines.size):
-        m = machines[group]
-        for k in range(commands.size + 1):
-            if k % every == 0:
-                for i in range(LANES):
-                    p = lane(m, i)
-                    for column, value in enumerate(core.truth_of(m.state[i::LANES], p)):
-                        result[group * LANES + i, k // every, column] = value
-            if k < commands.size:
-                for _ in range(steps):
-                    _step(m, commands[k], dt / steps)
-    return result
+    m = group[0]
+    for k in range(commands.size + 1):
+        if k % every == 0:
+            for i in range(LANES):
+                p = lane(m, i)
+                for column, value in enumerate(core.truth_of(m.state[i::LANES], p)):
+                    result[i, k // every, column] = value
+        if k < commands.size:
+            for _ in range(steps):
+                _step(m, commands[k], dt / steps)

@@ -6,10 +6,10 @@ next one on.
 """
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
-import scipy.interpolate  # noqa: F401 - loaded here, not when the first order comes
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -59,6 +59,8 @@ class TrajectoryNode(ControlNode):
             else:
                 self.law = mine(named(name, move))
         reject_unknown(self)
+        if not self.lockstep:  # else the clock would run on while the first order loads it
+            import_module("scipy.interpolate")
         self._name = self._doing = name
         self._stopped = False
         self.waypoints_heard = 0  # messages, rejected ones too

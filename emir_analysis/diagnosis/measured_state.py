@@ -13,7 +13,6 @@ another, and every effect that the machine's right-hand side holds is in the rig
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +25,7 @@ from emir_plant.effects import (
     valve_hysteresis,
 )
 from emir_plant.hydraulics import chambers
-from emir_plant.jit import compiled, compiled_in_place, compiled_parallel
+from emir_plant.jit import compiled_in_place, on_all_cores
 
 
 class Modelled(NamedTuple):
@@ -94,22 +93,25 @@ def _mean_rate(work: Array, i: int) -> float:
     return total / 6.0
 
 
-@compiled
+@compiled_in_place
 def _follow(  # noqa: PLR0913, PLR0917 (as _step)
-    start: Array,
-    commands: Array,
+    x: Array,
+    arriving: Array,
     dt: float,
     measured: Array,
     parameters: NDArray[Any],
+    work: Array,
+    at: Array,
     result: Array,
 ) -> None:
-    """Write the columns of Modelled along measured, (n, 5), to result, (5, n); steps of dt, s."""
+    """Write the columns of Modelled along measured, (n, 5), to result, (5, n); steps of dt, s.
+
+    x: (s,) the state at the start, advanced in place. arriving: (k,) the command at the valve.
+    work: (5, s) and at: (3, 5), zeros.
+    """
     p = parameters[0]
     samples, n = measured.shape[0], p.mode_joint.size
-    every = commands.size // (samples - 1)
-    arriving = command_delay.delayed(commands, dt, parameters)
-    x, work = start.copy(), np.zeros((5, start.size))
-    at = np.empty((3, measured.shape[1]))
+    every = arriving.size // (samples - 1)
     lifting, lowering, turning = 0.0, 0.0, 0.0
     for k in range(samples):
         result[0, k], result[1, k], result[2, k] = lifting, lowering, turning
@@ -137,7 +139,6 @@ def _follow(  # noqa: PLR0913, PLR0917 (as _step)
             turning += dt * p.mode_joint[0] * _mean_rate(work, core.MODES + n)
 
 
-@compiled_parallel
 def follow(
     starts: Array, commands: Array, dt: float, measured: Array, parameters: NDArray[Any]
 ) -> Array:
@@ -147,8 +148,13 @@ def follow(
     measured: (m, n, 5) p_H, p_S, Pa, smoothed boom angle, rad, its rate, rad/s, and the angle as
     it was read, rad, as each machine's sensors mean them. parameters: (m,) records.
     """
-    machines = parameters.size
-    result = np.zeros((machines, 5, measured.shape[1]))
-    for m in numba.prange(machines):
-        _follow(starts[m], commands, dt, measured[m], parameters[m : m + 1], result[m])
+    result = np.zeros((parameters.size, 5, measured.shape[1]))
+
+    def run(m: int) -> None:
+        own, x = parameters[m : m + 1], starts[m].copy()
+        arriving = command_delay.delayed(commands, dt, own)
+        work, at = np.zeros((5, x.size)), np.zeros((3, measured.shape[2]))
+        _follow(x, arriving, dt, measured[m], own, work, at, result[m])
+
+    on_all_cores(run, parameters.size)
     return result

@@ -32,7 +32,7 @@ from emir_plant.actuator.equations import (
 )
 from emir_plant.actuator.parameters import Actuator
 from emir_plant.actuator.unnamed import PLACES
-from emir_plant.jit import compiled_for_threads, compiled_in_place
+from emir_plant.jit import compiled_in_place
 
 Array = NDArray[np.float64]
 
@@ -204,13 +204,19 @@ def _write_run(  # noqa: PLR0913, PLR0917 (compiled code has no object to bundle
             break
 
 
-@compiled_for_threads
+@compiled_in_place
+def _write_runs(  # noqa: PLR0913, PLR0917 (as _write_run)
+    parameters: Any, command: Any, measured: Any, period: float, start: float, work: Any, runs: Any
+) -> None:
+    for m in range(parameters.size):
+        _write_run(parameters[m], command, measured, period, start, work[m], runs[m])
+
+
 def _run_each(
     parameters: NDArray[Any], command: Array, measured: Array, period: float, start: float
 ) -> Array:
     """Return what `_write_run` writes for each of (m,) records, (m, n, 2)."""
     machines = parameters.size
     work, runs = np.zeros((machines, 6, STATES)), np.empty((machines, command.size, 2))
-    for m in range(machines):
-        _write_run(parameters[m], command, measured, period, start, work[m], runs[m])
+    _write_runs(parameters, command, measured, period, start, work, runs)
     return runs

@@ -88,7 +88,8 @@ def factorized(z: Array, slopes: Array, added: Array, t: Tree) -> Factors:
             part -= 1
         for f in range(0 if t.kinds[k] == TURN else 2, -1, -1):
             at -= 1
-            motions[at] = tree_motions[t.coordinates[k] + f]
+            for i in range(6):  # one by one: as an assignment of rows it takes seconds to compile
+                motions[at, i] = tree_motions[t.coordinates[k] + f, i]
             pivots[at] = _pivot(outside, motions[at], moved, momenta[at]) + added[at] + square
             for i in range(6):
                 share = momenta[at, i] / pivots[at]

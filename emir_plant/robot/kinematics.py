@@ -102,11 +102,11 @@ def frames(z: Array, t: Tree) -> tuple[Array, Array, Array]:
     count = t.kinds.size
     axes, places = np.empty((count, 3, 3)), np.empty((count, 3))
     motions = np.zeros((z.size, 6))
-    units = np.eye(3)
+    units, origin = np.eye(3), np.zeros(3)
     for k in range(count):
         own, at = axes[k], places[k]
         if t.parents[k] == GROUND:
-            own[:], at[:] = units, t.places[k]
+            _carry(units, origin, t.places[k], own, at)
         else:
             _carry(axes[t.parents[k]], places[t.parents[k]], t.places[k], own, at)
         first = t.coordinates[k]
@@ -147,7 +147,7 @@ def _slide(axes: Array, along: Array, way: float, at: Array, motion: Array) -> N
 def _follow(q: Array, t: Tree, joint: int, axes: Array, place: Array) -> None:
     """Write axes, (3, 3), and place, (3,), m, of a joint's frame, down the chain to it alone."""
     units, motion = np.eye(3), np.empty(3)
-    axes[:], place[:] = units, 0.0
+    _carry(units, np.zeros(3), np.zeros(3), axes, place)
     at = 0
     for k in range(joint + 1):
         if t.drivers[k] != CHAIN:

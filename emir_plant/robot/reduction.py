@@ -35,8 +35,12 @@ def expand(
     slopes = np.empty(parts.shape[0])
     motions = np.empty((linkages.size, 4, 3))
     for i in range(linkages.size):
-        motions[i] = linkage.motion(q[joints[i + 1]], linkages[i])
-        motions[i, linkage.THRUST_BAR] -= motions[i, linkage.LEVER]  # the lever carries it
+        motion = linkage.motion(q[joints[i + 1]], linkages[i])
+        for j in range(motion.shape[1]):
+            motion[linkage.THRUST_BAR, j] -= motion[linkage.LEVER, j]  # the lever carries it
+            # one by one: assigning an array to a part of another takes seconds to compile
+            for row in range(motion.shape[0]):
+                motions[i, row, j] = motion[row, j]
     for k in range(independent.size):
         z[independent[k]], rate[independent[k]] = q[k], v[k]
     for k in range(parts.shape[0]):

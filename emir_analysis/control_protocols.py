@@ -23,11 +23,17 @@ class NodeControl(Stepping, Protocol):
     outputs: ClassVar[Topics]
 
 
+AT_REST = "at rest"  # state of a trajectory that is to begin where the machine stands, and stay
+
+
 class Guidable(NodeControl, Protocol):
     """A trajectory that can be stopped and given another way."""
 
     def held(self, state: Any, dt: float) -> Any:
-        """Return the state in which the reference comes to rest and stays there."""
+        """Return the state in which the reference comes to rest and stays there.
+
+        AT_REST where it has not begun: state None, or AT_REST itself.
+        """
 
     def follow(self, state: Any, points: Waypoints, dt: float) -> Any:
         """Return the state that follows the waypoints from here. Raises WaypointError."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from emir_analysis.control_protocols import Signals, Topics
+from emir_analysis.control_protocols import AT_REST, Signals, Topics
 from emir_control.cascade import Cascade, CascadeInputs, CascadeParameters
 from emir_control.force_loop import ForceLoop, ForceLoopInputs, ForceLoopOutputs
 from emir_control.limits import LimitParameters
@@ -111,7 +111,9 @@ class TrajectoryControl:
     def step(self, state: Any, signals: Signals, dt: float) -> tuple[Any, Signals]:
         """Return the next state and the reference of this period and of the next ones."""
         inputs = TrajectoryInputs(signals["stroke"])
-        state = state or self.trajectory.initial(inputs)
+        if state is None or state is AT_REST:
+            begin = self.trajectory.initial(inputs)
+            state = begin if state is None else self.held(begin, dt)
         motion = self._motion(state)
         ahead = motion.ahead(state, len(CYLINDER_PREVIEW.fields), dt)
         move = dict(zip(CYLINDER_MOVE.fields, motion.move(state, dt), strict=True))
@@ -120,8 +122,10 @@ class TrajectoryControl:
         preview = dict(zip(CYLINDER_PREVIEW.fields, ahead, strict=True))
         return state, reference | preview | move
 
-    def held(self, state: TrajectoryState, dt: float) -> TrajectoryState:
+    def held(self, state: Any, dt: float) -> Any:
         """Return the state in which the reference comes to rest and stays there."""
+        if state is None or state is AT_REST:
+            return AT_REST
         motion = self._motion(state).held(state.ticks * dt, state.start)
         return TrajectoryState(state.start, 0, motion)
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_analysis.control_protocols import Signals, Topics
+from emir_analysis.control_protocols import AT_REST, Signals, Topics
 from emir_analysis.node_controls import signals_of
 from emir_analysis.robot_setup import RobotForceLoopParameters
 from emir_control.cascade import Cascade, CascadeInputs
@@ -54,9 +54,11 @@ class RobotTrajectoryControl:
         """Return the next state and the reference of this period."""
         angles, forces = _six(signals, "angle"), _six(signals, "force")
         inputs = RobotTrajectoryInputs(angles, forces)
-        if state is None and not np.isfinite([angles, forces]).all():  # begins with the first ones
-            return None, {name: math.nan for topic in self.outputs for name in topic.fields}
-        state = state or self.trajectory.initial(inputs)
+        if state is None or state is AT_REST:
+            if not np.isfinite([angles, forces]).all():  # begins with the first ones
+                return state, {name: math.nan for topic in self.outputs for name in topic.fields}
+            begin = self.trajectory.initial(inputs)
+            state = begin if state is None else self.held(begin, dt)
         ahead = self.trajectory.ahead(state, PREVIEW, dt)
         state, now = self.trajectory.step(state, inputs, dt)
         preview = map(float, ahead.T.ravel())
@@ -70,6 +72,8 @@ class RobotTrajectoryControl:
 
     def held(self, state: Any, dt: float) -> Any:
         """Return the state in which the reference comes to rest and stays there."""
+        if state is None or state is AT_REST:
+            return AT_REST
         return self.trajectory.held(state, dt)
 
     def follow(self, state: Any, points: Waypoints, dt: float) -> Any:

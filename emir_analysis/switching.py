@@ -163,6 +163,11 @@ class Choosing:
         """Return the state in which that controller drives as soon as it is ready."""
         return state._replace(name=name) if state else Chosen(0, name, name)
 
+    @staticmethod
+    def at_once(state: Chosen) -> Chosen:
+        """Return the state in which who is to drive does, ready or not: who drove is lost."""
+        return state._replace(drives=state.name)
+
 
 @dataclass(frozen=True)
 class SwitchedLoop:

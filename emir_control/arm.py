@@ -44,18 +44,15 @@ class Arm:
     parameters: ArmParameters
 
     def tcp(self, joints: Array) -> Array:
-        """Return the TCP's x, y, z, pitch, (4,), m and rad, at rest at the joints' angles, (6,)."""
+        """Return the TCP's x, y, z, pitch, (..., 4), m and rad, at rest.
+
+        joints: angles, (..., 6), of one posture or many, rad.
+        """
         direction = self._directions(joints)
         forward, up = self._ends(direction)
-        base = joints[0]
-        return np.array(
-            [
-                math.cos(base) * forward[-1],
-                math.sin(base) * forward[-1],
-                self.parameters.height + up[-1],
-                direction[-1],
-            ]
-        )
+        base, out = joints[..., 0], forward[..., -1]
+        height = self.parameters.height + up[..., -1]
+        return np.stack((np.cos(base) * out, np.sin(base) * out, height, direction[..., -1]), -1)
 
     def jacobian(self, joints: Array) -> Array:
         """Return d(x, y, z, pitch)/d(joints), (4, 6), of the arm with its bending held."""
@@ -70,22 +67,25 @@ class Arm:
         return slope
 
     def ends(self, joints: Array) -> tuple[Array, Array]:
-        """Return how far out and up the sections' ends are from joint 1, (n + 1,) each, m."""
+        """Return how far out and up the sections' ends are from joint 1, (..., n + 1) each, m.
+
+        joints: angles, (..., 6), rad.
+        """
         return self._ends(self._directions(joints))
 
     def _directions(self, joints: Array) -> Array:
-        """Return the sections' directions over the horizontal, (n,), rad.
+        """Return the sections' directions over the horizontal, (..., n), rad.
 
         Bent, they are those in which the bending agrees with the weight of the bent arm.
         """
         p = self.parameters
-        straight = np.repeat(np.cumsum(joints[1:]), p.sections)
+        straight = np.repeat(np.cumsum(joints[..., 1:], -1), p.sections, -1)
         if not p.sag:
             return straight
-        cut = np.arange(straight.size) % p.sections != 0  # the others are joints
+        cut = np.arange(straight.shape[-1]) % p.sections != 0  # the others are joints
         direction = straight
         for _ in range(100):
-            bent = straight - np.cumsum(cut * self._moments(direction)) / p.section_spring
+            bent = straight - np.cumsum(cut * self._moments(direction), -1) / p.section_spring
             change = np.abs(bent - direction).max()
             direction = bent
             if change < SETTLED:
@@ -93,17 +93,18 @@ class Arm:
         raise ParameterError("section_spring: too weak for the arm's weight")
 
     def _moments(self, direction: Array) -> Array:
-        """Return the moments of all weight beyond at the sections' inner ends, (n,), N m."""
+        """Return the moments of all weight beyond at the sections' inner ends, (..., n), N m."""
         p = self.parameters
         forward, _ = self._ends(direction)
         mass = p.arm_mass / p.sections
-        middle = 0.5 * (forward[:-1] + forward[1:])
-        torque = np.cumsum((mass * middle)[::-1])[::-1] + p.payload * forward[-1]
-        beyond = mass * np.arange(middle.size, 0, -1) + p.payload
-        return np.asarray(GRAVITY * (torque - beyond * forward[:-1]))
+        middle = 0.5 * (forward[..., :-1] + forward[..., 1:])
+        torque = np.cumsum((mass * middle)[..., ::-1], -1)[..., ::-1]
+        torque = torque + p.payload * forward[..., -1:]
+        beyond = mass * np.arange(middle.shape[-1], 0, -1) + p.payload
+        return np.asarray(GRAVITY * (torque - beyond * forward[..., :-1]))
 
     def _ends(self, direction: Array) -> tuple[Array, Array]:
         length = self.parameters.arm_length / self.parameters.sections
-        start = np.zeros(1)
-        forward = np.concatenate((start, np.cumsum(length * np.cos(direction))))
-        return forward, np.concatenate((start, np.cumsum(length * np.sin(direction))))
+        start = np.zeros((*direction.shape[:-1], 1))
+        forward = np.concatenate((start, np.cumsum(length * np.cos(direction), -1)), -1)
+        return forward, np.concatenate((start, np.cumsum(length * np.sin(direction), -1)), -1)

@@ -29,13 +29,13 @@ def torques_along(arm: Arm, ways: Array, joints: Array) -> Array:
     ways: (n,), where the path has the joints' angles, (n, 6), rad.
     """
     masses = _masses(arm)
-    points = np.array([_points(arm, row) for row in joints])
+    points = _points(arm, joints)
     flat = scipy.interpolate.CubicSpline(ways, points.reshape(len(ways), -1))
     moved = (flat(ways, k).reshape(points.shape) for k in (2, 1))
     weight = np.broadcast_to([0.0, 0.0, GRAVITY], points.shape)
     pulls = masses[:, np.newaxis] * np.stack([weight, *moved], axis=1)  # (n, 3, points, 3)
-    slopes = np.array([_slopes(arm, *pair) for pair in zip(points, joints, strict=True)])
-    return np.asarray(np.einsum("ntpc,njpc->ntj", pulls, slopes))
+    slopes = _slopes(arm, points, joints)
+    return np.asarray(np.einsum("ntpc,njpc->ntj", pulls, slopes, optimize=True))
 
 
 def holding_torques(arm: Arm, joints: Array) -> Array:
@@ -70,29 +70,37 @@ def _masses(arm: Arm) -> Array:
 
 
 def _points(arm: Arm, joints: Array) -> Array:
-    """Return where the masses are, (points, 3), m, from joint 1; the payload last."""
+    """Return where the masses are, (..., points, 3), m, from joint 1; the payload last.
+
+    joints: angles, (..., 6), rad.
+    """
     forward, up = arm.ends(joints)
-    base = np.array([np.cos(joints[0]), np.sin(joints[0])])
+    base = joints[..., :1]
 
     def spread(ends: Array) -> Array:
-        middle, length = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
-        pairs = np.stack((middle - HALF * length, middle + HALF * length), axis=1)
-        return np.append(pairs.ravel(), ends[-1])
+        middle, length = 0.5 * (ends[..., 1:] + ends[..., :-1]), np.diff(ends)
+        pairs = np.stack((middle - HALF * length, middle + HALF * length), -1)
+        return np.concatenate((pairs.reshape(*ends.shape[:-1], -1), ends[..., -1:]), -1)
 
-    return np.column_stack((np.outer(spread(forward), base), spread(up)))
+    out = spread(forward)
+    return np.stack((out * np.cos(base), out * np.sin(base), spread(up)), -1)
 
 
 def _slopes(arm: Arm, points: Array, joints: Array) -> Array:
-    """Return dr/d(joints), (6, points, 3), with the bending held."""
+    """Return dr/d(joints), (..., 6, points, 3), with the bending held.
+
+    points: (..., points, 3). joints: (..., 6).
+    """
     forward, up = arm.ends(joints)
-    outward = np.array([np.cos(joints[0]), np.sin(joints[0])])
-    distance = points[:, :2] @ outward
-    slopes = np.zeros((len(JOINTS), *points.shape))
-    slopes[0, :, 0], slopes[0, :, 1] = -points[:, 1], points[:, 0]
+    cos, sin = np.cos(joints[..., :1]), np.sin(joints[..., :1])
+    distance = points[..., 0] * cos + points[..., 1] * sin
+    slopes = np.zeros((*joints.shape[:-1], len(JOINTS), *points.shape[-2:]))
+    slopes[..., 0, :, 0], slopes[..., 0, :, 1] = -points[..., 1], points[..., 0]
     each = 2 * arm.parameters.sections
     for k in range(1, len(JOINTS)):
         first = (k - 1) * each
         pivot = (k - 1) * arm.parameters.sections
-        slopes[k, first:, :2] = np.outer(up[pivot] - points[first:, 2], outward)
-        slopes[k, first:, 2] = distance[first:] - forward[pivot]
+        over = up[..., pivot, np.newaxis] - points[..., first:, 2]
+        slopes[..., k, first:, 0], slopes[..., k, first:, 1] = over * cos, over * sin
+        slopes[..., k, first:, 2] = distance[..., first:] - forward[..., pivot, np.newaxis]
     return slopes

@@ -25,7 +25,7 @@ from emir_control.trajectory import (
     TrajectoryParameters,
     distance_of,
 )
-from emir_control.waypoints import Along, Axis, Linkage, Waypoints, curve
+from emir_control.waypoints import Along, Axis, Linkage, WaypointError, Waypoints, curve
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,7 @@ LINE = "line"
 SPACING = 0.05  # m of a line between two of its places that are computed
 POINTS = 41  # of a path of one joint
 STEP = 1e-6  # rad, for the slope of a linkage
+SUDDEN = 2.0  # a force that sets in at once swings a hardly damped arm to so many times its own
 HEAVIEST = 3000.0  # kg, that a payload is taken for
 BAR = 1e5  # Pa
 LITRE = 1e-3 / 60.0  # m^3/s in a litre per minute
@@ -179,10 +180,13 @@ class RobotTrajectory:
         begin = [Reference(*map(float, pair)) for pair in zip(*now[:2], strict=True)]
         strokes = curve(points, self._axes(), begin)
         joints = np.array([self._angles(row) for row in strokes(strokes.x)])
-        places = scipy.interpolate.CubicSpline(
-            strokes.x, np.array([state.arm.tcp(row) for row in joints])
-        )
+        places = scipy.interpolate.CubicSpline(strokes.x, state.arm.tcp(joints))
         path = Path(strokes, places, _forces(state.arm, self.linkages, strokes.x, joints))
+        still, moving, _ = np.moveaxis(path.forces(strokes.x), 1, 0)  # time is the way: speed 1
+        try:
+            self._check_supply(strokes(strokes.x, 1), still + SUDDEN * moving)
+        except ReachError as error:
+            raise WaypointError(str(error)) from None
         return RobotTrajectoryState(path, Along(float(strokes.x[-1])), 0, state.arm)
 
     def _angles(self, strokes: Array) -> Array:
@@ -221,7 +225,7 @@ class RobotTrajectory:
             joints[:, k] = [linkage.angle(first + np.sign(distance) * way) for way in ways]
         if not ((self.ranges.low[k] <= joints[:, k]) & (joints[:, k] <= self.ranges.high[k])).all():
             raise ReachError(f"{self.name}: {name} would go beyond the end of its stroke")
-        places = np.array([self.arm.tcp(angles) for angles in joints])
+        places = self.arm.tcp(joints)
         path = self._path(ways, joints, places, self.move.speed)
         return path, Timing(
             abs(distance), self.move.speed, self.move.ramp, self.move.delay, self.move.pause
@@ -237,14 +241,14 @@ class RobotTrajectory:
             scipy.interpolate.CubicSpline(ways, places),
             forces,
         )
-        self._check_drives(path.strokes(ways, 1) * speed, path.forces(ways)[:, 0])
+        velocities, at_rest = path.strokes(ways, 1) * speed, path.forces(ways)[:, 0]
+        self._check_speeds(velocities)
+        there_and_back = np.concatenate((velocities, -velocities))
+        self._check_supply(there_and_back, np.tile(at_rest, (2, 1)))
         return path
 
-    def _check_drives(self, velocities: Array, forces: Array) -> None:
-        """Raise ReachError where valves or pump do not give a way's velocities, (n, 6).
-
-        forces: (n, 6), at rest. The way back counts as well.
-        """
+    def _check_speeds(self, velocities: Array) -> None:
+        """Raise ReachError where a valve does not give a way's velocities, (n, 6)."""
         needed = np.abs(velocities).max(axis=0)
         for name, wanted, drive in zip(JOINTS, needed, self.drives, strict=True):
             if wanted > drive.fastest:
@@ -253,8 +257,9 @@ class RobotTrajectory:
                     f"{name} would have to move at {wanted * factor:.3g} {unit},"
                     f" its valve gives {drive.fastest * factor:.3g}"
                 )
-        velocities = np.concatenate((velocities, -velocities))  # the way back takes other forces
-        forces = np.tile(forces, (2, 1))
+
+    def _check_supply(self, velocities: Array, forces: Array) -> None:
+        """Raise ReachError where the pump does not give a way's velocities and forces, (n, 6)."""
         flows = _each(Actuator.pumped, self.drives, velocities).sum(axis=1)
         if flows.max() > self.supply.flow:
             raise ReachError(

@@ -50,7 +50,7 @@ class ControlNode(Shell):
     """A node that turns the signals of its inputs into the signals of its outputs.
 
     A subclass sets `law`, whose state the node keeps; `stale` says what to do without fresh
-    inputs. A command that two nodes publish counts as missing: nobody knows which of them to obey.
+    inputs. What two nodes publish counts as missing: nobody knows which of them to believe.
     The node acts as often as its first output is to come. robot: whose inputs and outputs it has
     when the model is the whole robot.
 
@@ -224,16 +224,17 @@ class ControlNode(Shell):
 
     def missing(self) -> list[str]:
         """Return what keeps a period from running, in words; nothing: all is there."""
-        now = self.get_clock().now()
-        found = []
-        for name in self.needed():
-            if name not in self._latest:
-                found.append(f"no {name} yet")
-            elif not self._is_fresh(self._latest[name][0], now):
-                found.append(f"no fresh {name}")
-            elif self._inputs[name].quality == "command" and self.count_publishers(name) > 1:
-                found.append(f"more than one node publishes {name}")
-        return found
+        return [reason for name in self.needed() if (reason := self.why_not(name))]
+
+    def why_not(self, name: str) -> str:
+        """Return why an input is not to be used, in words; nothing: it is."""
+        if name not in self._latest:
+            return f"no {name} yet"
+        if not self._is_fresh(self._latest[name][0], self.get_clock().now()):
+            return f"no fresh {name}"
+        if self.count_publishers(name) > 1:
+            return f"more than one node publishes {name}"
+        return ""
 
     def _is_fresh(self, heard: "Time", now: "Time") -> bool:
         """Return whether an input is young enough; one from the future met a clock set back."""

@@ -220,7 +220,7 @@ def unused(plan: Plan) -> list[str]:
         names = [
             name
             for name, value in given.items()
-            if any(own[node].get(name, value) != value for node in nodes)
+            if any(name in own[node] and own[node][name] != value for node in nodes)
         ]
         if names:
             found.append(f"{pattern}: {', '.join(names)}")

@@ -43,6 +43,16 @@ class ParameterRecord:
         self._timer = node.create_timer(PERIOD, self._look, clock=steady)
         self._futures: list[Future] = []  # kept: nobody else holds them until they are done
 
+    @property
+    def waiting(self) -> list[str]:
+        """Return the nodes that have not answered."""
+        return sorted(self._waiting)
+
+    @property
+    def answers(self) -> dict[str, dict[str, Any]]:
+        """Return what has been answered so far."""
+        return dict(sorted(self._answers.items()))
+
     def _look(self) -> None:
         for name in sorted(self._waiting):
             self._looks[name] += 1
@@ -71,7 +81,7 @@ class ParameterRecord:
         values = map(parameter_value_to_python, answer.values)
         self._answers[node] = dict(zip(names, values, strict=True))
         if not self._waiting:
-            self._found(dict(sorted(self._answers.items())))
+            self._found(self.answers)
 
 
 def as_metadata(answers: dict[str, dict[str, Any]]) -> dict[str, str]:

@@ -31,6 +31,8 @@ from emir_ros.node_parameters import declare, declare_tree, naming, reject_unkno
 from emir_ros.shell import NodeError, Shell
 from emir_ros.wire import Wire, clock_message, sender, stamp_ns
 
+MOST_LATE = 10.0  # s, of a busy computer's timer; beyond that a clock was set
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlantNodeParameters:
@@ -181,7 +183,7 @@ class PlantNode(Shell):
 
     def _on_timer(self) -> None:
         now = self.seconds()
-        if self._started is None or now < self._now:  # /clock was set back
+        if self._started is None or not 0.0 <= now - self._now <= MOST_LATE:  # /clock was set
             self._started = now - self.tick * PLANT_PERIOD
         self._now = now
         self._beat.tick(now)

@@ -46,10 +46,23 @@ class RecordedSetup:
         self.complete = not nodes
         self._answers: dict[str, dict[str, Any]] = {}
         self._urdf: str | None = None if PLANT in nodes else ""  # None: still to come
-        if nodes:
-            ParameterRecord(node, list(nodes), self._on_answers)
+        self._record = ParameterRecord(node, list(nodes), self._on_answers) if nodes else None
         node.create_subscription(String, DESCRIPTION, self._on_urdf, qos.latched())
         node.create_subscription(ParameterEvent, "/parameter_events", self._on_change, EVENTS)
+
+    @property
+    def answered(self) -> list[str]:
+        """Return the nodes that have told their parameters."""
+        return [] if self._record is None else list(self._record.answers)
+
+    def finish(self) -> str:
+        """Store what has come so far, at the end; return what has not, in words, or nothing."""
+        if self.complete or self._record is None:
+            return ""
+        self._answers, self._urdf = self._record.answers, self._urdf or ""
+        self._store_when_known()
+        waiting = ", ".join(self._record.waiting)
+        return f"without the parameters of {waiting}: no answer" if waiting else ""
 
     def _on_answers(self, answers: dict[str, dict[str, Any]]) -> None:
         self._answers = answers

@@ -124,6 +124,11 @@ class RecorderNode(Shell):
         return self._writer
 
     @property
+    def answered(self) -> list[str]:
+        """Return the nodes that have told their parameters."""
+        return self._setup.answered
+
+    @property
     def changes(self) -> int:
         """Return how many settings of parameters were recorded."""
         return self._setup.changes
@@ -136,6 +141,9 @@ class RecorderNode(Shell):
             first, *others = self._full_names.values()
             count = f" and {len(others)} others" if others else ""
             self.get_logger().warning(f"nothing is recorded: no message came of {first}{count}")
+        lacking = self._setup.finish()
+        if lacking and not self.lockstep:  # `emir run` says itself why
+            self.get_logger().warning(lacking)
         for stamp in sorted(self._pending):
             self._write_stamp(stamp)
         self._events.write_all()

@@ -6,6 +6,7 @@ changes it while the machine moves.
 """
 
 from collections.abc import Collection, Sequence
+from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
@@ -40,7 +41,8 @@ class SelectorNode(ControlNode):
         first: str = self.get_parameter("controller").value
         self._check(first)
         self.law: Choosing = Choosing(self.selector, first)
-        self.add_on_set_parameters_callback(self._on_set)
+        self.add_on_set_parameters_callback(self._refuse_unknown)
+        self.add_post_set_parameters_callback(self._choose)
         reject_unknown(self)
         for name in names:
             self.take(OFFERED_COMMANDS[name])
@@ -49,6 +51,11 @@ class SelectorNode(ControlNode):
     def chosen(self) -> str:
         """Return who drives."""
         return self.state.drives if self.state else self.law.first
+
+    @property
+    def wanted(self) -> str:
+        """Return who is to drive, as soon as that one is ready."""
+        return self.state.name if self.state else self.law.first
 
     def followed(self) -> str:
         """Return the name of the command that is handed on."""
@@ -61,10 +68,16 @@ class SelectorNode(ControlNode):
         """Return the one command that matters; the others may be missing."""
         return (OFFERED_COMMANDS[self.chosen].name,)
 
+    def without(self, missing: Sequence[str]) -> None:
+        """Let who is wanted drive from the next period on where who drives is lost."""
+        if self.state and not self.why_not(OFFERED_COMMANDS[self.wanted].name):
+            self.state = self.law.at_once(self.state)
+        super().without(missing)
+
     def status(self) -> str:
         """Return who drives, and who will."""
-        name = self.state.name if self.state else self.chosen
-        waits = f"; {name} will, at rest or early in a move" if name != self.chosen else ""
+        waits = f"; {self.wanted} will, at rest or early in a move"
+        waits = waits if self.wanted != self.chosen else ""
         return f"{self.chosen} drives the machine{waits}"
 
     def _check(self, name: str) -> None:
@@ -72,16 +85,23 @@ class SelectorNode(ControlNode):
             known = ", ".join(self.selector.controllers)
             raise ParameterError(f"selector_node: controller {name!r}: running are {known}")
 
-    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == "controller":
-                try:
-                    self._check(parameter.value)
-                except ParameterError as error:
-                    return SetParametersResult(successful=False, reason=str(error))
-                self.state = self.law.choose(self.state, parameter.value)
-                self.orders.tell(SET, {"controller": parameter.value})
+    def _refuse_unknown(self, parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            for name in _controllers(parameters):
+                self._check(name)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _choose(self, parameters: list[Parameter]) -> None:
+        for name in _controllers(parameters):
+            self.state = self.law.choose(self.state, name)
+            self.orders.tell(SET, {"controller": name})
+
+
+def _controllers(parameters: list[Parameter]) -> list[Any]:
+    """Return what the parameter `controller` is set to, where it is among these."""
+    return [parameter.value for parameter in parameters if parameter.name == "controller"]
 
 
 def main() -> None:

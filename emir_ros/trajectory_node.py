@@ -13,11 +13,12 @@ import numpy as np
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from emir_analysis.control_protocols import Guidable
+from emir_analysis.control_protocols import AT_REST, Guidable, Signals
 from emir_analysis.node_controls import TrajectoryControl
 from emir_analysis.recorded_orders import FOLLOW, as_values
 from emir_analysis.robot_controls import RobotTrajectoryControl
 from emir_analysis.robot_setup import path_parameters, trajectory
+from emir_common.quantity import ParameterError
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
@@ -34,6 +35,8 @@ from emir_ros.node_parameters import (
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
 JOINT_TRAJECTORY = "joint_trajectory"
+LARGEST_LAG = 10.0  # m or rad
+SHOWN = 100  # periods in which a rejection stands on /diagnostics
 
 
 class TrajectoryNode(ControlNode):
@@ -58,15 +61,35 @@ class TrajectoryNode(ControlNode):
                 self.law = six(trajectory(sheet, name, move, path))
             else:
                 self.law = mine(named(name, move))
+        about = "the machine may be behind the reference [m; of the base rad], real time"
+        self._lag_limit: float = declare(self, "lag_limit", 0.1, about)
+        if not 0.0 < self._lag_limit <= LARGEST_LAG:
+            raise ParameterError(
+                f"trajectory_node: lag_limit = {self._lag_limit:g}: outside 0 ... {LARGEST_LAG:g}"
+            )
         reject_unknown(self)
         if not self.lockstep:  # else the clock would run on while the first order loads it
             import_module("scipy.interpolate")
         self._name = self._doing = name
         self._stopped = False
+        self._rejected, self._shown_for = "", 0  # and in how many periods that was said
+        self._left_behind = ""  # who, in words
         self.waypoints_heard = 0  # messages, rejected ones too
         for verb in (self.start, self.hold, self.stop):
             self.create_service(Trigger, f"~/{verb.__name__}", self._answer(verb))
         self.create_subscription(JointTrajectory, JOINT_TRAJECTORY, self._on_waypoints, RELIABLE)
+
+    def control(self, signals: Signals, dt: float) -> Signals:
+        """Return the reference; in real time it stops where the machine does not follow.
+
+        Gone on without a machine whose valve is shut, it would be caught up with at full speed.
+        """
+        outputs = super().control(signals, dt)
+        behind = "" if self.lockstep else _left_behind(signals, outputs, self._lag_limit)
+        if behind:
+            self._left_behind = behind
+            self.state, self._doing = self.law.held(None, dt), "held"
+        return outputs
 
     def stale(self, missing: Sequence[str]) -> None:
         """Publish nothing; the motion goes on when the inputs are back."""
@@ -75,30 +98,37 @@ class TrajectoryNode(ControlNode):
         """Return what is being done."""
         return self._doing
 
+    def caution(self, outputs: Signals) -> str:
+        """Return why the reference stopped, or the last waypoints were rejected.
+
+        The latter for a while: not everybody looks always.
+        """
+        self._shown_for += 1
+        return self._left_behind or (self._rejected if self._shown_for <= SHOWN else "")
+
     def start(self) -> str:
         """Begin the named trajectory where the machine stands."""
         self.state, self._stopped, self._doing = None, False, self._name
+        self._left_behind = ""
         return f"{self._name} begins"
 
     def hold(self) -> str:
         """Bring the reference to rest where it is."""
-        if self.state is None:
-            raise WaypointError("nothing moves yet")
         self.state = self.law.held(self.state, self._period * 1e-9)
-        self._doing = "held"
+        self._doing = "stopped" if self._stopped else "held"
         return "comes to rest"
 
     def stop(self) -> str:
         """Hold, and take no waypoints until `start`."""
-        said = self.hold()
-        self._stopped, self._doing = True, "stopped"
-        return f"{said}; goes on after ~/start"
+        self._stopped = True
+        return f"{self.hold()}; goes on after ~/start"
 
     def _answer(self, verb: Any) -> Any:
         def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
                 self._need_to_be_active()
                 response.message, response.success = verb(), True
+                self._rejected = ""
                 self.orders.tell(verb.__name__, {})
             except WaypointError as error:
                 response.message = str(error)
@@ -117,17 +147,32 @@ class TrajectoryNode(ControlNode):
             points = _waypoints(message)
             self._follow(points)
         except WaypointError as error:
-            self.diagnostics.say(Level.WARN, f"{JOINT_TRAJECTORY} rejected: {error}")
+            self.diagnostics.counts["waypoints rejected"] += 1
+            self._rejected = f"{JOINT_TRAJECTORY} rejected: {error}"
+            self._shown_for = 0
+            self.diagnostics.say(Level.WARN, self._rejected)
         else:
+            self._rejected = ""
+            self._left_behind = ""
             self.orders.tell(FOLLOW, as_values(points))
             self._doing = f"follows {JOINT_TRAJECTORY}"
 
     def _follow(self, points: Waypoints) -> None:
         if self._stopped:
             raise WaypointError("stopped, goes on after ~/start")
-        if self.state is None:
+        if self.state is None or self.state is AT_REST:
             raise WaypointError("no reference yet to begin at")
         self.state = self.law.follow(self.state, points, self._period * 1e-9)
+
+
+def _left_behind(signals: Signals, outputs: Signals, limit: float) -> str:
+    """Return which piston is farther from its reference than a limit, in words; nothing: none."""
+    for name in (name for name in outputs if name.endswith("reference_stroke")):
+        front = name.removesuffix("reference_stroke")
+        if abs(outputs[name] - signals[f"{front}stroke"]) > limit:
+            who = front.rstrip("_") or "the piston"
+            return f"held: {who} did not follow, {limit:g} m (base: rad) behind; ~/start goes on"
+    return ""
 
 
 def _waypoints(message: JointTrajectory) -> Waypoints:

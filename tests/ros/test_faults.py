@@ -18,6 +18,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from sim_clock import DEADLINE, SIM_TIME, SimClock
 
@@ -25,6 +26,8 @@ from emir_analysis.recover import recover
 from emir_msgs_py import conversions
 from emir_msgs_py.topics import (
     CONTROL_PERIOD_NS,
+    CYLINDER_REFERENCE,
+    CYLINDER_STATES,
     JOINT_STATES,
     OFFERED_COMMANDS,
     PLANT_PERIOD_NS,
@@ -37,6 +40,7 @@ from emir_msgs_py.topics import (
 from emir_ros import qos
 from emir_ros.force_loop_node import TIMEOUT, ForceLoopNode
 from emir_ros.selector_node import SelectorNode
+from emir_ros.trajectory_node import TrajectoryNode
 
 HOUR = 3600 * 1_000_000_000
 SENSORS = (JOINT_STATES, PRESSURE_LIFTING, PRESSURE_LOWERING)
@@ -45,6 +49,7 @@ OFFERED = OFFERED_COMMANDS["cascade"]
 SIGNALS = {
     "velocity_command": 0.02,
     "cascade_command": 0.02,
+    "pfc_command": 0.01,
     "angle": 0.8,
     "pressure_lifting": 1e7,
     "pressure_lowering": 2e6,
@@ -54,11 +59,11 @@ SIGNALS = {
 class Bench:
     """The force loop on a test bench: time and inputs are given to it, its commands heard."""
 
-    def __init__(self, command: Topic = VELOCITY_COMMAND, before: Sequence[Node] = ()) -> None:
-        """command: what it is given; before: nodes that make its command of that."""
+    def __init__(self, *commands: Topic, before: Sequence[Node] = ()) -> None:
+        """commands: what it is given; before: nodes that make its command of that."""
         self.loop = ForceLoopNode(SIM_TIME)
         self._nodes = [self.loop, *before]
-        self.inputs = (command, *SENSORS)
+        self.inputs = (*(commands or [VELOCITY_COMMAND]), *SENSORS)
         self.node = Node("bench")
         self.valve: list[float] = []
         profile = qos.offered(lockstep=False)
@@ -129,7 +134,7 @@ def test_one_message_in_twenty_lost_changes_nothing(bench: Bench) -> None:
 def test_a_command_is_acted_on_when_it_comes(command: Topic, ros: None) -> None:
     """Also by way of the selector: timers on the way would delay it by up to a period each."""
     chosen = [*SIM_TIME, "-p", "controllers:=[cascade]"]
-    bench = Bench(command, [SelectorNode(chosen)] if command is OFFERED else [])
+    bench = Bench(command, before=[SelectorNode(chosen)] if command is OFFERED else [])
     bench.settle()
     for k in range(40):
         before = len(bench.valve)
@@ -155,6 +160,93 @@ def test_commands_late_by_100_ms_shut_the_valve_and_open_it_when_they_come(bench
     while bench.valve[-1] == 0.0:
         assert len(bench.valve) < before + 3
         bench.tick()
+
+
+def test_the_reference_stops_where_the_machine_does_not_follow(ros: None) -> None:
+    """It would else be caught up with at full speed once the valve may open again."""
+    far = [w for value in ("distance:=0.5", "speed:=0.1", "delay:=0.0") for w in ("-p", value)]
+    node, operator = TrajectoryNode([*SIM_TIME, *far]), Node("operator")
+    executor = SingleThreadedExecutor()
+    for each in (node, operator):
+        executor.add_node(each)
+    clock, wanted = SimClock(operator, executor), CYLINDER_REFERENCE
+    heard: list[dict[str, float]] = []
+    profile = qos.offered(lockstep=False)
+    kind = conversions.message_class(CYLINDER_STATES.type)
+    states = operator.create_publisher(kind, CYLINDER_STATES.name, profile)
+    operator.create_subscription(
+        kind,
+        wanted.name,
+        lambda message: heard.append(conversions.values(wanted, message)),
+        profile,
+    )
+    still = dict.fromkeys(CYLINDER_STATES.fields, 0.0) | {"stroke": 0.4}
+
+    def run(until: Callable[[], object]) -> None:
+        deadline = time.monotonic() + DEADLINE
+        while not until():
+            assert time.monotonic() < deadline
+            clock.advance([node])
+            states.publish(conversions.message(CYLINDER_STATES, clock.now, still))
+            clock.settle()
+
+    try:
+        run(lambda: heard)
+        node.start()
+        run(lambda: heard[-1]["reference_stroke"] > 0.45)
+        run(lambda: heard[-1]["reference_velocity"] == 0.0)
+        farthest = max(entry["reference_stroke"] for entry in heard)
+        assert 0.5 < farthest < 0.5 + 0.1 * 2.0 * CONTROL_PERIOD_NS * 1e-9
+        stopped = len(heard)
+        run(lambda: len(heard) > stopped + 20)
+        assert all(entry["reference_stroke"] == 0.4 for entry in heard[stopped:])
+        assert "did not follow" in node.caution({})
+        node.start()
+        run(lambda: heard[-1]["reference_velocity"] > 0.0)
+        assert not node.caution({})
+    finally:
+        for each in (node, operator):
+            each.destroy_node()
+
+
+def test_who_is_chosen_takes_over_from_a_dead_controller(ros: None) -> None:
+    """The one that drove need not come back, nor be waited for."""
+    selector = SelectorNode([*SIM_TIME, "-p", "controllers:=[cascade, pfc]"])
+    bench = Bench(OFFERED, OFFERED_COMMANDS["pfc"], before=[selector])
+    bench.settle()
+    alive = [topic for topic in bench.inputs if topic is not OFFERED]
+    deadline = time.monotonic() + DEADLINE
+    while bench.valve[-1] != 0.0:
+        assert time.monotonic() < deadline
+        bench.tick(alive)
+    assert selector.chosen == "cascade"
+    selector.set_parameters([Parameter("controller", value="pfc")])
+    while bench.valve[-1] == 0.0:
+        assert time.monotonic() < deadline
+        bench.tick(alive)
+    assert selector.chosen == "pfc"
+
+
+def test_a_refused_set_changes_nothing(ros: None) -> None:
+    """All or none: what is set together with a parameter that is refused is not in force."""
+    selector = SelectorNode([*SIM_TIME, "-p", "controllers:=[cascade, pfc]"])
+    both = [Parameter("controller", value="pfc"), Parameter("use_sim_time", value=False)]
+    assert not selector.set_parameters_atomically(both).successful
+    assert selector.chosen == selector.wanted == "cascade"
+    assert selector.get_parameter("controller").value == "cascade"
+    selector.destroy_node()
+
+
+def test_two_machines_at_once_shut_the_valve(bench: Bench) -> None:
+    """Sensors that two nodes publish are those of neither."""
+    kind = conversions.message_class(JOINT_STATES.type)
+    second = bench.node.create_publisher(kind, JOINT_STATES.name, qos.offered(lockstep=False))
+    deadline = time.monotonic() + DEADLINE
+    while bench.valve[-1] != 0.0:
+        assert time.monotonic() < deadline
+        bench.tick()
+    bench.node.destroy_publisher(second)
+    bench.settle()
 
 
 def test_a_message_without_its_number_counts_as_none(bench: Bench) -> None:

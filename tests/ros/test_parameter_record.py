@@ -1,6 +1,7 @@
 """The parameters of other nodes, also when the middleware drops an answer."""
 
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,8 +13,12 @@ from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 
+from emir_analysis.recorded_parameters import recorded_nodes, recorded_parameters
+from emir_msgs_py import conversions
+from emir_msgs_py.topics import JOINT_STATES
 from emir_ros import parameter_record
 from emir_ros.parameter_record import ParameterRecord
+from emir_ros.recorder_node import RecorderNode
 
 pytestmark = pytest.mark.usefixtures("ros")
 
@@ -59,3 +64,31 @@ def test_a_dropped_answer_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) ->
     del record
     assert Dropped.dropped == {"list", "get"}
     assert [answers["asked"]["gain"] for answers in found] == [2.0]
+
+
+def test_a_node_that_is_absent_costs_no_other_its_parameters(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / "bag"
+    words = ["-p", f"bag:={bag}", "-p", "nodes:=[asked, absent]"]
+    asked, recorder = Node("asked"), RecorderNode(["--ros-args", *words])
+    asked.declare_parameter("gain", 2.0)
+    message = conversions.message(JOINT_STATES, 0, {"angle": 0.8, "velocity": 0.0})
+    angles = asked.create_publisher(type(message), JOINT_STATES.name, 10)
+    executor = SingleThreadedExecutor()
+    for node in (asked, recorder):
+        executor.add_node(node)
+    deadline = time.monotonic() + 120.0
+    try:
+        while not (recorder.answered and recorder.heard):
+            assert time.monotonic() < deadline
+            angles.publish(message)
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        recorder.close()
+        executor.shutdown()
+        for node in (asked, recorder):
+            node.destroy_node()
+    assert set(recorded_nodes(bag)) == {"asked"}
+    assert recorded_parameters(bag, "asked")["gain"] == 2.0
+    assert "without the parameters of absent: no answer" in capfd.readouterr().err

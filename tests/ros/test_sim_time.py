@@ -87,9 +87,9 @@ def test_a_controller_lives_in_the_recordings_time() -> None:
             node.destroy_node()
 
 
-@pytest.mark.parametrize("jump", [0, -HOUR], ids=["on", "set back"])
+@pytest.mark.parametrize("jump", [0, -HOUR, 1000 * HOUR], ids=["on", "set back", "set on"])
 def test_the_machine_lives_in_the_clocks_time(jump: int) -> None:
-    """A plant period of /clock is one of the machine, also after the clock was set back."""
+    """A plant period of /clock is one of the machine, also after the clock was set."""
     listener, plant = Node("listener"), PlantNode(SIM_TIME)
     executor = SingleThreadedExecutor()
     for node in (plant, listener):

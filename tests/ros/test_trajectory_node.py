@@ -136,7 +136,6 @@ def _of(heard: list[dict[str, float]], name: str) -> np.ndarray:
 def test_hold_stop_and_start(model: str, front: str) -> None:
     stroke, velocity = f"{front}reference_stroke", f"{front}reference_velocity"
     with _bench(model) as bench:
-        assert not bench.call("hold").success
         bench.run(1.6)
         assert bench.heard[-1][velocity] == pytest.approx(0.025, rel=1e-3)
         assert bench.call("hold").success
@@ -157,6 +156,56 @@ def test_hold_stop_and_start(model: str, front: str) -> None:
         assert _of(bench.heard, velocity)[-1] > 0.02
         again = _of(bench.heard, stroke)[-round(1.0 / DT)]
         assert again == pytest.approx(strokes[0], abs=1e-9)  # where the machine stands
+
+
+@pytest.mark.parametrize(("model", "front"), [(JOINT1, ""), (ROBOT, "joint1_")])
+def test_what_is_stopped_before_it_begins_stays_where_the_machine_is(
+    model: str, front: str
+) -> None:
+    stroke, velocity = f"{front}reference_stroke", f"{front}reference_velocity"
+    with _bench(model) as bench:
+        assert bench.call("stop").success
+        bench.run(1.6)
+        assert not _of(bench.heard, velocity).any()
+        assert np.ptp(_of(bench.heard, stroke)) == 0.0
+        assert bench.call("start").success
+        bench.run(1.6)
+        assert bench.heard[-1][velocity] == pytest.approx(0.025, rel=1e-3)
+        bench.signals = {name: value + 0.01 for name, value in bench.signals.items()}
+        for verb in ("start", "stop", "hold"):  # all before the next period
+            assert bench.call(verb).success
+        before = len(bench.heard)
+        bench.run(0.5)
+        assert not _of(bench.heard[before:], velocity).any()
+        bench.send(["cylinder1"], [[0.5]], [5.0])
+        bench.told("joint_trajectory rejected: stopped, goes on after ~/start")
+        assert "stopped" in bench.said
+        assert "held" not in bench.said
+
+
+def test_a_rejection_stands_on_diagnostics_for_a_while() -> None:
+    with _bench(JOINT1) as bench:
+        bench.run(DT)
+        bench.send(["elbow"], [[3.0]], [20.0])
+        bench.told("joint 'elbow': there are cylinder1")
+        said = len(bench.said)
+        bench.run(2.0)
+        assert len(bench.said) == said
+        bench.run(2.0)
+        bench.until(lambda: bench.said[-1] == "lift-lower")
+
+
+def test_waypoints_that_take_more_force_than_the_pump_gives_are_rejected() -> None:
+    """The base has to turn an arm of 22.5 m: 0.06 rad in 1.2 s is beyond its motor, in 4 s not."""
+    with _bench(ROBOT) as bench:
+        bench.run(DT)
+        there = Posture().angles
+        there[0] -= 0.06
+        bench.send(list(JOINTS), [there.tolist()], [1.2])
+        bench.told("base would need")
+        bench.send(list(JOINTS), [there.tolist()], [4.0])
+        bench.run(DT)
+        bench.told("follows joint_trajectory")
 
 
 @pytest.mark.parametrize("model", [JOINT1, ROBOT])

@@ -11,8 +11,10 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.run_errors import free_run, free_run_errors
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise, leaves_quiet
+from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import column_rms, rms
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -20,6 +22,7 @@ from emir_plant.parameters import Machine
 STAGES = ("nominal", "refitted", "with_effect")
 REFITTED = STAGES[1]
 BLACK_BOX = "black_box"
+WITHIN = 3.0  # standard deviations, within which a size is the same
 
 
 @dataclass(frozen=True)
@@ -29,9 +32,9 @@ class Judged:
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
     errors (n, 4) of the change from one sample to the next, of each recording, as in `Balances`.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
-    surprising: what was found does not explain them, or one of their signals. reconciled: nothing
-    was found missing, and other parameters inside the tolerances explain them and the recordings
-    that were fitted.
+    surprising: what was found does not explain them, or one of their signals. reconciled: the same
+    effects, or none, do with other parameters inside the tolerances, and the recordings that were
+    fitted, too; not asked where something is known to be unexplained or sticks.
     """
 
     evidence: Evidence
@@ -72,8 +75,8 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     one_step[BLACK_BOX] = [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
     alone = loudest_signal(findings.chosen.machine, evidence)[1]
     surprising = not explained(findings.chosen, evidence) or alone > EXPLAINED
-    asked = findings.verdict == "nothing_missing" and surprising
-    reconciled = asked and _reconciled(findings, evidence)
+    asked = findings.verdict in {"nothing_missing", "found"} and not sticks(findings.chosen)
+    reconciled = asked and surprising and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
 
 
@@ -86,7 +89,7 @@ def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:
 
 
 def _reconciled(findings: Findings, judge: Evidence) -> bool:
-    """Tell whether parameters alone bring all recordings together to the noise.
+    """Tell whether the same effects bring all recordings together to the noise.
 
     What was fitted may have left some of them open, or have known them from next to nothing.
     """
@@ -96,7 +99,15 @@ def _reconciled(findings: Findings, judge: Evidence) -> bool:
     both = Evidence(experiments, findings.sheet.machine)
     balanced = fit_balances(findings.chosen, both, both.floor(findings.chosen.machine))
     fitted = fit_free_run(balanced, both)
-    return at_noise(fitted, both) and leaves_quiet(fitted, both)
+    left_alone = _same_sizes(findings.chosen, fitted)
+    return left_alone and at_noise(fitted, both) and leaves_quiet(fitted, both)
+
+
+def _same_sizes(found: Trial, fitted: Trial) -> bool:
+    """Tell whether a further fit leaves the effects as they were found."""
+    sizes = [u.path.startswith("effects.") for u in found.unknowns.members]
+    moved = np.abs(fitted.x - found.x)[sizes]
+    return bool(np.all(moved <= WITHIN * found.spread[sizes]))
 
 
 def _spread(shown: Array, evidence: Evidence) -> Array:

@@ -14,6 +14,7 @@ from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.loads import LOAD
+from emir_analysis.diagnosis.moments import Moments, is_told, moments
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
@@ -66,7 +67,7 @@ def _of_findings(findings: Findings) -> str:
         return _of_parameters(findings)
     remainder = _remainder(findings)
     if findings.verdict == "unexplained":
-        left = remainder or f"the balances are quiet, but the free run drifts away{_from(findings)}"
+        left = remainder or f"{_quiet(findings)} the free run drifts away{_from(findings)}"
         if findings.misstated:
             return f"{left}; {_misstated(findings)}"
         known = "" if findings.rejected is None else _rejected(findings.rejected, findings)
@@ -172,6 +173,30 @@ def _misstated(findings: Findings) -> str:
     )
 
 
+def _quiet(findings: Findings) -> str:
+    """Return that the balances are quiet, and at which moments they are not."""
+    said = []
+    for column, (name, balance) in enumerate(BALANCES.items()):
+        noise = float(findings.floor[column])
+        residual = findings.residuals["refitted"][:, column]
+        seldom = moments(residual, noise, findings.evidence.time) if is_told(noise) else None
+        if seldom is not None:
+            said.append(
+                f"{name} lacks up to {seldom.size:.3g} {balance.unit}"
+                f" ({seldom.size / noise:.0f} times its noise) at {_times(seldom, findings)}"
+            )
+    if not said:
+        return "the balances are quiet, but"
+    return f"the balances are quiet but for moments: {'; '.join(said)}; and"
+
+
+def _times(seldom: Moments, findings: Findings) -> str:
+    places = [findings.evidence.place(time) for time in seldom.times]
+    several = len(findings.evidence.experiments) > 1
+    said = [f"{time:.1f} s of {name}" if several else f"{time:.1f} s" for name, time in places]
+    return ", ".join(said) + (f" and {seldom.more} more" if seldom.more else "")
+
+
 def _from(findings: Findings) -> str:
     """Return from when on the free run of parameters alone is off, as quiet balances have them.
 
@@ -232,21 +257,30 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
-    by = f"all in all {off:.1f} times the noise off"
-    if math.isnan(off):
-        by = "where it cannot even rest"
-    if off <= EXPLAINED:  # in one signal alone, then
-        name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
-        by = f"where {name} is {alone:.1f} times its noise off"
     worse = ""
     if findings.chosen.effects and off > judged.off(REFITTED):
         worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"
     more = f"shows more{_elsewhere(findings, judged)}"
-    if judged.reconciled:
+    if judged.reconciled and findings.chosen.effects:
+        more += (
+            ", which the same effects and other parameters inside the tolerances explain as well"
+        )
+    elif judged.reconciled:
         more += ", which other parameters inside the tolerances explain as well"
     if LOAD in findings.chosen.effects:
         more += "; a load from outside may have come at other times there"
-    return f"; but {judge}, {by}{worse}, {more}: diagnose from that too"
+    return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: diagnose from that too"
+
+
+def _off(findings: Findings, judged: Judged) -> str:
+    """Return how far off the judge recordings are, and in which signal most."""
+    off = judged.off(STAGES[-1])
+    if math.isnan(off):
+        return "where it cannot even rest"
+    name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
+    if off <= EXPLAINED:  # in one signal alone, then
+        return f"where {name} is {alone:.1f} times its noise off"
+    return f"all in all {off:.1f} times the noise off, {name} {alone:.1f}"
 
 
 def _elsewhere(findings: Findings, judged: Judged) -> str:

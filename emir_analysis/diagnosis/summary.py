@@ -19,8 +19,9 @@ LOUD = (
     " times that the pictures of them show."
 )
 QUIET = (
-    ". The balances are quiet: the cause acts seldom, or by hardly more than their noise. Look at"
-    " what happened when the simulated signals depart from the measured ones."
+    ". The balances are quiet nearly all of the time: the cause acts seldom, or by hardly more than"
+    " their noise. Look at what happened at the moments that are named, or else when the simulated"
+    " signals depart from the measured ones."
 )
 
 

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.experiment import (
 from emir_analysis.diagnosis.graph_signals import graph_signals
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.model_file import write_model
+from emir_analysis.diagnosis.noise_size import as_measured
 from emir_analysis.diagnosis.page import write_page
 from emir_analysis.diagnosis.predictions import write_predictions
 from emir_analysis.diagnosis.result import Diagnosis, diagnosis, write_json
@@ -60,6 +61,9 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     _tell_unread(datasheet, sheet.ignored, progress)
     _tell_unread(signals, [name for name in signal_map or () if name not in SIGNALS], progress)
     experiments = [_opened(each, signal_map, sheet.machine, progress) for each in bags]
+    sheet, noisier = as_measured(sheet, experiments)
+    for line in noisier:
+        progress(line)
     findings = diagnose(experiments, sheet, progress)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
     opened, failed = _judges(judges, signal_map, sheet.machine, progress)

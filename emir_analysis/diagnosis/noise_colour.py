@@ -7,7 +7,7 @@ first-order process (AR(1), Box and Jenkins 1970) of the stated standard deviati
 import numpy as np
 from scipy.signal import detrend, lfilter
 
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment, noise
+from emir_analysis.diagnosis.experiment import Experiment, at_rest, noise
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -24,10 +24,8 @@ def colours(experiment: Experiment, machine: Machine) -> Array:
     where the changes are those of white noise of the stated size: what is slow is then the
     machine, as a load that swings, not its sensor.
     """
-    moving = np.flatnonzero(np.abs(experiment.commands) > machine.valve.dead_zone)
-    rest = int(moving[0] * COMMAND_STEP / experiment.period)
     stated = noise(machine)
-    columns = experiment.outputs[:rest].T
+    columns = experiment.outputs[: at_rest(experiment, machine)].T
     return np.array([_colour(column, s) for column, s in zip(columns, stated, strict=True)])
 
 

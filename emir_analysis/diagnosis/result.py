@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 INTERVAL = 2.0  # standard deviations on either side of a parameter's low and high
 FEWEST_DIGITS = 3
 OPEN = "not determined by the recording"
-SET = "set: as good as fitted"
+SET = "not told here: taken so"
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 
 

@@ -67,8 +67,8 @@ def cautions(result: Diagnosis) -> list[str]:
     lines = [result.tell_apart] if result.tell_apart else []
     if result.at_end:
         lines.append(
-            f"at the end of what is allowed: {', '.join(result.at_end)}; a machine may be there,"
-            " but where this one cannot, something else is missing"
+            f"at the end of what is allowed: {_ends(result)}; a machine may be there, but where"
+            " this one cannot, something else is missing"
         )
     if any(effect.name == DELAY for effect in result.effects):
         lines.append(
@@ -76,6 +76,15 @@ def cautions(result: Diagnosis) -> list[str]:
             " that one clock stamps command and sensors"
         )
     return lines + list(result.untold.values())
+
+
+def _ends(result: Diagnosis) -> str:
+    """Return the parameters that stand at an end of what is allowed, with what they are there."""
+    known = result.parameters
+    return ", ".join(
+        f"{path} = {known[path].value:.4g} {known[path].unit}" if path in known else path
+        for path in result.at_end
+    )
 
 
 def in_short(result: Diagnosis) -> str:

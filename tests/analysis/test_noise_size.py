@@ -1,0 +1,59 @@
+"""A sensor noisier than its data sheet says is told by what it shows at rest, and no other one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import recorded
+from operated import operated
+
+from emir_analysis.diagnosis.experiment import Experiment
+from emir_analysis.diagnosis.free_run import COMPARED, free_runs
+from emir_analysis.diagnosis.noise_size import as_measured
+from emir_plant.sheet import Sheet, joint1
+
+MACHINE = joint1()
+SHEET = Sheet(MACHINE, {}, {}, ())
+STATED = np.array([0.0, 0.2e5, 0.2e5, 2e-5])  # Pa, Pa, rad
+SLOW = 5.4  # Hz, a boom that sways at rest
+
+
+def _read(times: tuple[float, float, float], sway: float = 0.0) -> Experiment:
+    """Return a recording whose sensors of p_H, p_S and bending have so many times their noise.
+
+    sway: of both pressures at rest, Pa.
+    """
+    rest = np.zeros(round(3.0 / recorded.COMMAND_PERIOD))
+    seen = operated(MACHINE, np.concatenate([rest, recorded.moves(30.0, seed=5)]))
+    (ideal,) = free_runs([MACHINE], seen, [(0.8, 20e5)])
+    outputs = ideal[:, COMPARED].copy()
+    white = np.random.default_rng(8).standard_normal((len(outputs), 3))
+    outputs[:, 1:] += white * STATED[1:] * times
+    outputs[:, 1:3] += sway * np.sin(2.0 * np.pi * SLOW * seen.time)[:, np.newaxis]
+    return replace(seen, outputs=outputs)
+
+
+@pytest.mark.parametrize("times", [2.0, 5.0])
+def test_noise_beyond_the_stated_is_taken_as_measured(times: float) -> None:
+    sheet, (line,) = as_measured(SHEET, [_read((times, times, 1.0))])
+    assert sheet.machine.sensors.pressure_noise == pytest.approx(times * 0.2e5, rel=0.1)
+    assert sheet.machine.sensors.deflection_noise == MACHINE.sensors.deflection_noise
+    assert line.startswith("pressure_lifting, pressure_lowering: scatter at rest by")
+    sheet, _ = as_measured(SHEET, [_read((1.0, 1.0, times))])
+    assert sheet.machine.sensors.deflection_noise == pytest.approx(times * 2e-5, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("times", "sway"),
+    [
+        ((1.0, 1.0, 1.0), 0.0),
+        ((0.3, 0.3, 0.3), 0.0),
+        ((3.0, 1.0, 1.0), 0.0),
+        ((1.0, 1.0, 1.0), 2e5),
+    ],
+    ids=["as stated", "less", "one of two pressures", "a boom that sways"],
+)
+def test_else_it_stays_as_stated(times: tuple[float, float, float], sway: float) -> None:
+    sheet, lines = as_measured(SHEET, [_read(times, sway)])
+    assert sheet is SHEET
+    assert not lines

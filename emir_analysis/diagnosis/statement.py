@@ -1,7 +1,7 @@
 """What a diagnosis has found, in words."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -32,7 +32,8 @@ ALIKE = 0.05  # relative
 DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
-SHORT = 0.3  # of the recordings: a stretch of time that is named
+FLOWS = frozenset({"lifting_chamber", "lowering_chamber"})
+SHORT = 0.5  # of the recordings: a stretch of time that is named
 CURVE_PARTS = {  # of a curve, as they are called
     "along": "whatever the direction",
     "friction": "against the motion",
@@ -98,23 +99,38 @@ def _remainder(findings: Findings) -> str:
         return ""
     stage = "refitted" if findings.verdict == "unexplained" else "after"
     column = list(BALANCES).index(speaking)
-    size = level(findings.residuals[stage])[column]
-    noise_share = size / findings.floor[column]
+    left = level(findings.residuals[stage])
+    loudness = dict(zip(BALANCES, left / findings.floor, strict=True))
+    over = left > findings.limit
+    others = [name for name, loud in zip(BALANCES, over, strict=True) if loud and name != speaking]
     keeps = (
-        f"the balance {speaking} keeps {size:.3g} {BALANCES[speaking].unit}"
-        f" ({noise_share:.1f} times its noise)"
+        f"the balance {speaking} keeps {left[column]:.3g} {BALANCES[speaking].unit}"
+        f" ({loudness[speaking]:.1f} times its noise{_beside(speaking, others, loudness)})"
     )
     if findings.curve is not None or findings.misstated:
         return keeps
     if findings.drift is not None:
         return f"{keeps}; {_drifting(findings.drift)}"
     keeps += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
-    if speaking == "force" and _is_untold(shape, findings.swing, lies):
+    by_force = speaking == "force" and FLOWS.isdisjoint(others)  # which no load disturbs
+    if by_force and _is_untold(shape, findings.swing, lies):
         keeps += (
             "; it may be a load from outside (wind, a push, a load that swings) of another"
             " course over time than those looked for"
         )
     return keeps
+
+
+def _beside(speaking: str, others: Sequence[str], loudness: Mapping[str, float]) -> str:
+    """Return which other balances speak, and the one sensor that only those read that do."""
+    if not others:
+        return ""
+    quiet = [n for n, size in loudness.items() if n not in others and not math.isnan(size)]
+    read = frozenset.intersection(*(BALANCES[name].signals for name in (speaking, *others)))
+    heard = frozenset().union(*(BALANCES[name].signals for name in quiet if name != speaking))
+    only = read - heard
+    told = f"; they all read {', '.join(only)}, the quiet ones do not" if len(only) == 1 else ""
+    return "; beside it " + ", ".join(f"{name} {loudness[name]:.1f}" for name in others) + told
 
 
 def other_reasons(chosen: Trial) -> str:

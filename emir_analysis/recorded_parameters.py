@@ -14,7 +14,7 @@ Values = dict[str, Any]
 # parameters of nodes, not of what they hold
 OF_EVERY_NODE = (
     "lockstep", "model", "input_timeout", "standby", "autostart", "use_sim_time",
-    "start_type_description_service",
+    "start_type_description_service", "lag_limit",
 )  # fmt: skip
 OF_A_TOPIC = "qos_overrides."
 

@@ -6,6 +6,7 @@ next one on.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -18,7 +19,7 @@ from emir_analysis.node_controls import TrajectoryControl
 from emir_analysis.recorded_orders import FOLLOW, as_values
 from emir_analysis.robot_controls import RobotTrajectoryControl
 from emir_analysis.robot_setup import path_parameters, trajectory
-from emir_common.quantity import ParameterError
+from emir_common.quantity import check_ranges, quantity
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_control.waypoints import WaypointError, Waypoints
 from emir_msgs_py.topics import ROBOT
@@ -35,8 +36,19 @@ from emir_ros.node_parameters import (
 
 RELIABLE = 10  # depth of JOINT_TRAJECTORY
 JOINT_TRAJECTORY = "joint_trajectory"
-LARGEST_LAG = 10.0  # m or rad
 SHOWN = 100  # periods in which a rejection stands on /diagnostics
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryNodeParameters:
+    """What the node itself takes care of."""
+
+    lag_limit: float = quantity(
+        "m", 1e-3, 10.0, "behind which the reference stops, real time; of the base rad", default=0.1
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 class TrajectoryNode(ControlNode):
@@ -61,12 +73,7 @@ class TrajectoryNode(ControlNode):
                 self.law = six(trajectory(sheet, name, move, path))
             else:
                 self.law = mine(named(name, move))
-        about = "the machine may be behind the reference [m; of the base rad], real time"
-        self._lag_limit: float = declare(self, "lag_limit", 0.1, about)
-        if not 0.0 < self._lag_limit <= LARGEST_LAG:
-            raise ParameterError(
-                f"trajectory_node: lag_limit = {self._lag_limit:g}: outside 0 ... {LARGEST_LAG:g}"
-            )
+        self._lag_limit: float = declare_tree(self, TrajectoryNodeParameters()).lag_limit
         reject_unknown(self)
         if not self.lockstep:  # else the clock would run on while the first order loads it
             import_module("scipy.interpolate")

@@ -5,7 +5,7 @@ The nodes of the graph, the plain loop and the replay of a recording all hold th
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -40,6 +40,7 @@ from emir_msgs_py.topics import CYLINDER_PREVIEW
 Array = NDArray[np.float64]
 
 MOTOR = JOINTS[0]
+HOLD = "hold"  # of a trajectory's names
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,8 @@ class RobotTrajectoryControl:
         if state is None or state is AT_REST:
             if not np.isfinite([angles, forces]).all():  # begins with the first ones
                 return state, {name: math.nan for topic in self.outputs for name in topic.fields}
-            begin = self.trajectory.initial(inputs)
-            state = begin if state is None else self.held(begin, dt)
+            still = replace(self.trajectory, name=HOLD)  # the named one may not be possible here
+            state = (self.trajectory if state is None else still).initial(inputs)
         ahead = self.trajectory.ahead(state, PREVIEW, dt)
         state, now = self.trajectory.step(state, inputs, dt)
         preview = map(float, ahead.T.ravel())

@@ -76,9 +76,10 @@ class SelectorNode(ControlNode):
 
     def status(self) -> str:
         """Return who drives, and who will."""
-        waits = f"; {self.wanted} will, at rest or early in a move"
-        waits = waits if self.wanted != self.chosen else ""
-        return f"{self.chosen} drives the machine{waits}"
+        now = f"{self.chosen} drives the machine"
+        if self.wanted == self.chosen:
+            return now
+        return f"{now}; {self.wanted} will, at rest or early in a move"
 
     def _check(self, name: str) -> None:
         if name not in self.selector.controllers:

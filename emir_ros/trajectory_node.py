@@ -94,8 +94,8 @@ class TrajectoryNode(ControlNode):
         outputs = super().control(signals, dt)
         behind = "" if self.lockstep else _left_behind(signals, outputs, self._lag_limit)
         if behind:
-            self._left_behind = behind
-            self.state, self._doing = self.law.held(None, dt), "held"
+            self._left_behind, self.state = behind, None
+            self.hold()
         return outputs
 
     def stale(self, missing: Sequence[str]) -> None:

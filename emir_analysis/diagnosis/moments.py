@@ -3,7 +3,6 @@
 A level is taken over the quieter windows and does not know of it.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +29,11 @@ class Moments:
 def moments(residual: Array, noise: float, time: Array) -> Moments | None:
     """Return when a balance speaks loudly; None: never.
 
-    residual and time, s, of its windows: (w,). noise: its level without what is missing.
+    residual and time, s, of its windows: (w,). noise: its level without what is missing; where that
+    is 0 or NaN it has nothing to say.
     """
+    if not noise > 0.0:
+        return None
     size = np.abs(residual)
     loud = np.flatnonzero(size > LOUD * noise)
     if not loud.size:
@@ -41,8 +43,3 @@ def moments(residual: Array, noise: float, time: Array) -> Moments | None:
     told = sorted(sorted(peaks, key=lambda k: -size[k])[:TOLD])
     times = tuple(float(time[k]) for k in told)
     return Moments(float(size.max()), times, len(peaks) - len(told))
-
-
-def is_told(noise: float) -> bool:
-    """Tell whether a balance can speak: its noise is known and there is some."""
-    return math.isfinite(noise) and noise > 0.0

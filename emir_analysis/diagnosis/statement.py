@@ -14,7 +14,7 @@ from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.moments import Moments, is_told, moments
+from emir_analysis.diagnosis.moments import Moments, moments
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
@@ -125,9 +125,10 @@ def _beside(speaking: str, others: Sequence[str], loudness: Mapping[str, float])
     """Return which other balances speak, and the one sensor that only those read that do."""
     if not others:
         return ""
-    quiet = [n for n, size in loudness.items() if n not in others and not math.isnan(size)]
-    read = frozenset.intersection(*(BALANCES[name].signals for name in (speaking, *others)))
-    heard = frozenset().union(*(BALANCES[name].signals for name in quiet if name != speaking))
+    speak = (speaking, *others)
+    quiet = [name for name, size in loudness.items() if name not in speak and not math.isnan(size)]
+    read = frozenset.intersection(*(BALANCES[name].signals for name in speak))
+    heard = frozenset().union(*(BALANCES[name].signals for name in quiet))
     only = read - heard
     told = f"; they all read {', '.join(only)}, the quiet ones do not" if len(only) == 1 else ""
     return "; beside it " + ", ".join(f"{name} {loudness[name]:.1f}" for name in others) + told
@@ -195,7 +196,7 @@ def _quiet(findings: Findings) -> str:
     for column, (name, balance) in enumerate(BALANCES.items()):
         noise = float(findings.floor[column])
         residual = findings.residuals["refitted"][:, column]
-        seldom = moments(residual, noise, findings.evidence.time) if is_told(noise) else None
+        seldom = moments(residual, noise, findings.evidence.time)
         if seldom is not None:
             said.append(
                 f"{name} lacks up to {seldom.size:.3g} {balance.unit}"

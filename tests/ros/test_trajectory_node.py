@@ -20,6 +20,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import ParameterError
+from emir_control.inverse import ReachError
 from emir_msgs_py import conversions
 from emir_msgs_py.robot_topics import (
     JOINTS,
@@ -47,9 +48,9 @@ SIGNALS = {JOINT1: {"stroke": 0.4, "force": 0.0}} | {
 class Bench(Node):
     """Gives the node its measurements and hears its reference, a period at a time."""
 
-    def __init__(self, model: str) -> None:
+    def __init__(self, model: str, more: tuple[str, ...]) -> None:
         super().__init__("bench")
-        words = ["lockstep:=true", f"model:={model}", "delay:=0.1", "pause:=0.2"]
+        words = ["lockstep:=true", f"model:={model}", "delay:=0.1", "pause:=0.2", *more]
         self.node = TrajectoryNode(["--ros-args", *(w for p in words for w in ("-p", p))])
         robot = model == ROBOT
         states = (ROBOT_JOINT_STATES, ROBOT_CYLINDER_STATES) if robot else (CYLINDER_STATES,)
@@ -117,9 +118,10 @@ class Bench(Node):
 
 
 @contextmanager
-def _bench(model: str) -> Iterator[Bench]:
+def _bench(model: str, *more: str) -> Iterator[Bench]:
+    """Give a bench; more: parameters of the node, NAME:=VALUE."""
     rclpy.init()
-    bench = Bench(model)
+    bench = Bench(model, more)
     try:
         yield bench
     finally:
@@ -181,6 +183,16 @@ def test_what_is_stopped_before_it_begins_stays_where_the_machine_is(
         bench.told("joint_trajectory rejected: stopped, goes on after ~/start")
         assert "stopped" in bench.said
         assert "held" not in bench.said
+
+
+def test_at_rest_no_named_motion_is_needed_that_cannot_be_made() -> None:
+    with _bench(ROBOT, "trajectory:=line", "line.x:=29.0", "line.z:=29.0") as bench:
+        assert bench.call("stop").success
+        bench.run(0.5)
+        assert not _of(bench.heard, "joint1_reference_velocity").any()
+        assert bench.call("start").success
+        with pytest.raises(ReachError, match="line: "):
+            bench.run(DT)
 
 
 def test_a_rejection_stands_on_diagnostics_for_a_while() -> None:

@@ -198,7 +198,8 @@ class RobotTrajectory:
         axes = []
         for k, (name, of) in enumerate(zip(JOINTS, self.linkages, strict=True)):
             ends = (of.stroke(float(self.ranges.low[k])), of.stroke(float(self.ranges.high[k])))
-            axes.append(Axis(name, of, min(ends), max(ends), self.drives[k].fastest))
+            unit = "rad" if name == "base" else "m"
+            axes.append(Axis(name, of, min(ends), max(ends), self.drives[k].fastest, unit))
         return axes
 
     def _line(self, start: Array) -> tuple[Path, Timing]:

@@ -51,13 +51,17 @@ class Direct:
 
 @dataclass(frozen=True)
 class Axis:
-    """A joint that waypoints may name: its limits in strokes, m, and m/s."""
+    """A joint that waypoints may name: its limits in strokes, m, and m/s.
+
+    unit: of its strokes, where they are something else.
+    """
 
     name: str
     linkage: Linkage
     low: float
     high: float
     fastest: float
+    unit: str = "m"
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,8 @@ def _in_strokes(
     for axis, speed in zip(axes, fastest, strict=True):
         if speed > axis.fastest:
             raise WaypointError(
-                f"{axis.name}'s drive would have to move at {speed:.3g}, it can {axis.fastest:.3g}"
+                f"{axis.name}'s drive would have to move at {speed:.3g} {axis.unit}/s,"
+                f" it can {axis.fastest:.3g}"
             )
     return found
 

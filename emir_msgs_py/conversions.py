@@ -57,6 +57,8 @@ def _in_order(topic: Topic, message: Any) -> Any:
     for name in topic.names:
         if name not in given:
             raise LookupError(f"the message has no {name}, but {', '.join(given)}")
+        if given.count(name) > 1:
+            raise LookupError(f"the message names {name} more than once")
     order = [given.index(name) for name in topic.names]
     arrays = {name: getattr(message, name) for name in ("position", "velocity", "effort")}
     # an array that lacks one of them would put the others in the wrong places: as if not given

@@ -111,7 +111,7 @@ BAD: dict[str, tuple[Callable[[], Waypoints], str]] = {
     "overshoot": (
         lambda: _points([10.0, 20.0, 30.0], [0.89, 0.89, 0.5]), "cylinder1 leaves its range",
     ),
-    "speed": (lambda: _points([1.0], [0.4]), "have to move at 0.15, it can 0.06"),
+    "speed": (lambda: _points([1.0], [0.4]), "have to move at 0.15 m/s, it can 0.06"),
 }  # fmt: skip
 
 

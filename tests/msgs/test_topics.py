@@ -102,6 +102,9 @@ def test_numbers_of_a_joint_state_belong_to_the_names_beside_them() -> None:
     given.name[1] = "another"
     with pytest.raises(LookupError, match=f"no {JOINTS[-1]}, but gripper, another"):
         conversions.values(states, given)
+    given.name[0], given.name[1] = JOINTS[0], JOINTS[-1]
+    with pytest.raises(LookupError, match=f"names {JOINTS[0]} more than once"):
+        conversions.values(states, given)
 
 
 def test_a_command_to_another_valve_is_none_to_ours() -> None:

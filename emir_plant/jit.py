@@ -8,14 +8,46 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache, update_wrapper
+from importlib import import_module
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar, cast
 
-import numba
-from llvmlite import ir
-from numba.extending import intrinsic
-
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class OnFirstUse:
+    """What numba makes, made when it is first called or first compiled into something else.
+
+    numba takes half a second and 60 MB to load, which who wants a machine's parameters alone, such
+    as a controller's node, does without.
+    """
+
+    def __init__(self, make: Callable[[], Any]) -> None:
+        self._make, self._made, self._lock = make, None, Lock()
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Return what the made function returns."""
+        made = self._made or self._now_made()
+        return made(*arguments)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Its type, for which numba asks while it compiles who calls it."""
+        return _typing_context().resolve_value_type(self._made or self._now_made())
+
+    def _now_made(self) -> Any:
+        with self._lock:  # or threads would compile it once each
+            if self._made is None:
+                self._made = self._make()
+            return self._made
+
+
+def _typing_context() -> Any:
+    from numba.core.registry import cpu_target  # noqa: PLC0415 (see OnFirstUse)
+
+    return cpu_target.typing_context
 
 
 def _cache_folder() -> Path:
@@ -27,12 +59,26 @@ def _cache_folder() -> Path:
     return root / digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+@cache
+def _numba() -> Any:
+    import numba  # noqa: PLC0415 (see OnFirstUse)
+
+    numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+    import_module("emir_plant.instructions")  # numba knows what is there before it compiles
+    return numba
+
+
+def _compiled(function: Function, **options: bool) -> Function:
+    def make() -> Any:
+        decorate = _numba().njit(cache=True, error_model="numpy", forceinline=True, **options)
+        return decorate(function)
+
+    return cast("Function", update_wrapper(OnFirstUse(make), function))
 
 
 def compiled(function: Function) -> Function:
     """Compile `function` with numba: IEEE arithmetic, cached on disk."""
-    return cast("Function", numba.njit(cache=True, error_model="numpy", forceinline=True)(function))
+    return _compiled(function)
 
 
 def compiled_in_place(function: Function) -> Function:
@@ -42,10 +88,7 @@ def compiled_in_place(function: Function) -> Function:
     compiler cannot see through so large a function that every count is taken back. Called from
     Python it leaves the interpreter's lock to others, so that threads run it side by side.
     """
-    decorate = numba.njit(  # type: ignore[call-overload]  # numba's stubs leave out its last option
-        cache=True, error_model="numpy", forceinline=True, nogil=True, _nrt=False
-    )
-    return cast("Function", decorate(function))
+    return _compiled(function, nogil=True, _nrt=False)
 
 
 def on_all_cores(work: Callable[[int], None], number: int) -> None:
@@ -54,7 +97,7 @@ def on_all_cores(work: Callable[[int], None], number: int) -> None:
     By threads of Python and not by numba's own loop: that has the compiler go through everything
     in it three times more, which was a third of a first start. Raises what `work` raises.
     """
-    threads = min(number, numba.get_num_threads())
+    threads = min(number, _numba().get_num_threads())
     if threads <= 1:
         for i in range(number):
             work(i)
@@ -63,13 +106,7 @@ def on_all_cores(work: Callable[[int], None], number: int) -> None:
         list(pool.map(work, range(number)))  # the list, so that it raises
 
 
-@intrinsic
-def _sqrt(_context: Any, _argument: Any) -> Any:
-    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        root = builder.module.declare_intrinsic("llvm.sqrt", [ir.DoubleType()])
-        return builder.call(root, arguments)
-
-    return numba.float64(numba.float64), generate
+_instruction = OnFirstUse(lambda: import_module("emir_plant.instructions").square_root)
 
 
 @compiled
@@ -78,5 +115,5 @@ def square_root(number: float) -> float:
 
     One instruction; `math.sqrt` asks the C library whenever the number may be negative.
     """
-    root: float = _sqrt(number)  # type: ignore[call-arg]  # numba gives the context
+    root: float = _instruction(number)
     return root

@@ -21,6 +21,16 @@ for name in sys.argv[1:]:
 parts = {name.split(".")[1] for name in sys.modules if name.startswith("scipy.")}
 print(*sorted(part for part in parts if not part.startswith("_") and part != "version"))
 """
+COMPILER = """
+import sys
+from importlib import import_module
+
+for name in sys.argv[1:]:
+    import_module(f"emir_ros.{name}")
+print("numba" in sys.modules)
+import_module("emir_plant.jit").square_root(2.0)
+print("numba" in sys.modules)
+"""
 MAKE = """
 import sys
 
@@ -47,6 +57,11 @@ def test_no_part_of_scipy_is_loaded_before_it_is_needed() -> None:
     others = sorted(NODES - PLANNERS.keys())
     assert len(others) > len(PLANNERS)
     assert _parts_of_scipy(others) == []
+
+
+def test_the_compiler_is_loaded_by_who_computes_with_the_machine() -> None:
+    """numba takes half a second and 60 MB, which no controller needs."""
+    assert _printed(COMPILER, *sorted(NODES)).split() == ["False", "True"]
 
 
 @pytest.mark.parametrize("node", PLANNERS)

@@ -36,7 +36,7 @@ setup(
     install_requires=[
         "matplotlib>=3.8",
         "mcap>=1.5,<1.7",  # mcap_writer.py reaches into its Writer
-        "mcap-ros2-support>=0.5",
+        "mcap-ros2-support>=0.5,<0.7",  # import_command.py takes what it serializes by
         "numba>=0.59",
         "numpy>=1.26",
         "plotly>=6.0",

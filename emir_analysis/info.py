@@ -17,13 +17,15 @@ PARAMETERS = "emir.parameters"  # the one with the parameters of its nodes, JSON
 CHANGE = "emir.parameter_change"  # with a number behind it: one that was set during the run
 FIELDS = "fields"  # the channel metadata with path, unit and meaning by signal, JSON
 
+Fields = dict[str, dict[str, str]]
+
 
 @dataclass
 class TopicInfo:
     """A recorded topic. first, last: log times, ns."""
 
     type: str
-    fields: dict[str, dict[str, str]] = field(default_factory=dict)
+    fields: Fields = field(default_factory=dict)
     count: int = 0
     first: int = 0
     last: int = 0
@@ -101,7 +103,7 @@ def _count(file: Path, found: Info) -> None:
             types[record.id] = record.name
         elif isinstance(record, Channel):
             kind = types.get(record.schema_id, "unknown type")
-            new = TopicInfo(kind, json.loads(record.metadata.get(FIELDS, "{}")))
+            new = TopicInfo(kind, _fields(record.metadata.get(FIELDS, "{}")))
             topics[record.id] = found.topics.setdefault(record.topic, new)
         elif isinstance(record, bags.Raw) and record.channel_id in topics:
             topics[record.channel_id].add(record.log_time)
@@ -113,6 +115,16 @@ def _count(file: Path, found: Info) -> None:
         elif isinstance(record, Metadata) and record.name.startswith(CHANGE):
             m = record.metadata  # by name: a split recording repeats it in every file
             found.changes[record.name] = Change(int(m["time"]), m["node"], m["name"], m["value"])
+
+
+def _fields(told: str) -> Fields:
+    """Return what a channel tells of its fields; others keep something else under that name."""
+    try:
+        fields: Fields = json.loads(told)
+        known = all({"path", "unit", "meaning"} <= entry.keys() for entry in fields.values())
+    except (ValueError, AttributeError):
+        return {}
+    return fields if known else {}
 
 
 def text(found: Info) -> str:

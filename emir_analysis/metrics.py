@@ -1,7 +1,7 @@
 """Figures of a run: one function each, with a name and a unit.
 
 A function takes the recording and returns its figure, or None where the recording does not
-hold what it needs. `METRICS` is the only list of them.
+hold what it needs. `METRICS` and `METRICS_OF_THE_TCP` are the only lists of them.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ LONGEST_LAG = 1.5  # s
 COARSE_LAG = 0.016  # s: half a period of the reference, over which the error changes smoothly
 FINE_LAG = 1e-3  # s
 PAPER_LAG = 0.4  # s, T of law (11)
-BOOM_LENGTH = 22.5  # m, paper 1
 MOVING = 1e-4  # m/s of reference speed
+PLATEAU = 0.999  # of the highest reference speed
 SEEN_AHEAD = len(CYLINDER_PREVIEW.fields) * CONTROL_PERIOD  # s
 
 
@@ -40,7 +40,7 @@ class Metric:
 class Definition:
     """How a figure is made."""
 
-    function: Callable[[Recording], float | None]
+    function: Callable[..., float | None]
     unit: str
 
     @property
@@ -48,10 +48,10 @@ class Definition:
         """Return the figure's name, that of its function."""
         return self.function.__name__
 
-    def of(self, recording: Recording) -> Metric:
-        """Return the figure of a recording."""
+    def of(self, recording: Recording, *known: float | None) -> Metric:
+        """Return the figure of a recording. known: of its machine, as the function takes it."""
         meaning = (self.function.__doc__ or "").splitlines()[0]
-        return Metric(self.name, self.function(recording), self.unit, meaning)
+        return Metric(self.name, self.function(recording, *known), self.unit, meaning)
 
 
 def tracking_error_rms(run: Recording) -> float:
@@ -78,7 +78,7 @@ def lag_plateau(run: Recording) -> float | None:
     """Delay of the stroke behind the reference where its velocity has been constant."""
     velocity = run["reference_velocity"]
     top = np.max(np.abs(velocity.value))
-    settled = np.flatnonzero(np.abs(velocity.value) > 0.999 * top)  # of all moves
+    settled = np.flatnonzero(np.abs(velocity.value) > PLATEAU * top)  # of all moves
     if top < MOVING or settled.size == 0:
         return None
     ends = settled[np.flatnonzero(np.diff(settled, append=settled[-1] + 2) > 1)]
@@ -107,15 +107,15 @@ def tcp_deflection_down(run: Recording) -> float | None:
     return None if dynamic is None else float(dynamic.min())
 
 
-def tcp_error_up(run: Recording) -> float | None:
+def tcp_error_up(run: Recording, boom_length: float | None) -> float | None:
     """TCP above the place where the reference, 0.4 s ago, wanted it: oil and boom together."""
-    error = _tcp_error(run)
+    error = _tcp_error(run, boom_length)
     return None if error is None else float(error.max())
 
 
-def tcp_error_down(run: Recording) -> float | None:
+def tcp_error_down(run: Recording, boom_length: float | None) -> float | None:
     """TCP below the place where the reference, 0.4 s ago, wanted it: oil and boom together."""
-    error = _tcp_error(run)
+    error = _tcp_error(run, boom_length)
     return None if error is None else float(error.min())
 
 
@@ -143,17 +143,20 @@ METRICS = (
     Definition(tcp_deflection_static, "m"),
     Definition(tcp_deflection_up, "m"),
     Definition(tcp_deflection_down, "m"),
-    Definition(tcp_error_up, "m"),
-    Definition(tcp_error_down, "m"),
     Definition(pressure_lifting_peak, "Pa"),
     Definition(pressure_lowering_peak, "Pa"),
     Definition(valve_travel, "1"),
 )
+METRICS_OF_THE_TCP = (Definition(tcp_error_up, "m"), Definition(tcp_error_down, "m"))
 
 
-def metrics(run: Recording) -> list[Metric]:
-    """Return all figures of a run of the graph."""
-    return [definition.of(run) for definition in METRICS]
+def metrics(run: Recording, boom_length: float | None) -> list[Metric]:
+    """Return all figures of a run of the graph.
+
+    boom_length: of its machine, m; where that is not known, the TCP's place is not either.
+    """
+    figures = [definition.of(run) for definition in METRICS]
+    return figures + [definition.of(run, boom_length) for definition in METRICS_OF_THE_TCP]
 
 
 def _tracking_error(run: Recording) -> Array:
@@ -197,17 +200,17 @@ def _dynamic_deflection(run: Recording) -> Array | None:
     return None if static is None else run["tcp_deflection"].value - static
 
 
-def _tcp_error(run: Recording) -> Array | None:
+def _tcp_error(run: Recording, boom_length: float | None) -> Array | None:
     """Return the TCP's error across the boom, m, against the reference PAPER_LAG ago.
 
     The angle that belongs to a reference stroke is read off the recorded pairs of both.
     """
     dynamic = _dynamic_deflection(run)
-    if dynamic is None:
+    if dynamic is None or boom_length is None:
         return None
     stroke, angle = run["true_stroke"].value, run["true_angle"].value
     if not np.ptp(stroke):
         return None
     angle_at = np.polynomial.Polynomial.fit(stroke, angle, 3)
     wanted = at(run, "reference_stroke", run["tcp_deflection"].time - PAPER_LAG)
-    return BOOM_LENGTH * (angle - angle_at(wanted)) + dynamic
+    return boom_length * (angle - angle_at(wanted)) + dynamic

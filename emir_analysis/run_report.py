@@ -10,8 +10,10 @@ from typing import Any
 
 from emir_analysis import bags
 from emir_analysis.errors import InputError
+from emir_analysis.machine_record import PLANT
 from emir_analysis.metrics import Metric, metrics
 from emir_analysis.outputs import write_picture, write_text, written
+from emir_analysis.recorded_parameters import recorded_parameters
 from emir_analysis.report import Block, Heading, Plot, Table, Text, write_html
 from emir_analysis.robot_metrics import robot_metrics
 from emir_analysis.robot_picture import path_picture
@@ -38,7 +40,11 @@ class RunAnalysis:
 def analyze(bag: Path) -> RunAnalysis:
     """Compute the figures of a recording of the graph. Raises InputError as `load_run`."""
     recording = load_run(bag)
-    figures = robot_metrics(recording) if is_robot(recording) else metrics(recording)
+    if is_robot(recording):
+        figures = robot_metrics(recording)
+    else:
+        length = recorded_parameters(bag, PLANT).get("geometry.boom_length")
+        figures = metrics(recording, length)
     return RunAnalysis(bag, bags.metadata(bag).get("emir", {}), recording, figures)
 
 

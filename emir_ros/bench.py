@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ import numpy as np
 import rclpy
 from numpy.typing import NDArray
 from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 
 from emir_analysis import bags, columns
 from emir_analysis.bench.reading import reading_figures
@@ -146,27 +147,24 @@ def _latency(rate: float, seconds: float) -> Part:
     here, there = multiprocessing.get_context("spawn").Pipe()
     listener = multiprocessing.get_context("spawn").Process(target=_listen, args=(there,))
     listener.start()
-    rclpy.init()
-    node = rclpy.create_node("bench_sender")
-    wire, kind = Wire(JOINT_STATES), conversions.message_class(JOINT_STATES.type)
-    publisher = node.create_publisher(kind, "bench", qos.offered(lockstep=False))
-    _find_listener(publisher)
-    while not here.poll(0.01):
-        publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
-    here.recv()
-    period, sent = 1.0 / rate, 0
-    begin = time.monotonic()
-    while sent < rate * seconds:
-        time.sleep(max(begin + sent * period - time.monotonic(), 0.0))
-        publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
-        sent += 1
-    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
-    time.sleep(0.1)
-    here.send("enough")
-    sent_at, late = np.array(here.recv()).T
-    listener.join()
-    node.destroy_node()
-    rclpy.try_shutdown()
+    there.close()  # so that its end shows
+    wire, period, sent = Wire(JOINT_STATES), 1.0 / rate, 0
+    with ExitStack() as ending:
+        ending.callback(listener.terminate)
+        publisher = ending.enter_context(_publisher("bench", qos.offered(lockstep=False)))
+        while not here.poll(0.01):
+            publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
+        here.recv()
+        begin = time.monotonic()
+        while sent < rate * seconds:
+            time.sleep(max(begin + sent * period - time.monotonic(), 0.0))
+            publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
+            sent += 1
+        publisher.wait_for_all_acked(Duration(seconds=SETTLING))
+        time.sleep(0.1)
+        here.send("enough")
+        sent_at, late = np.array(here.recv()).T
+        listener.join()
     late = late[sent_at >= begin]
     title = f"Latency between two processes at {rate:g} Hz"
     return title, [*_spread(late), Figure("lost", 100.0 * (1.0 - late.size / sent), "%")]
@@ -244,25 +242,21 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
     recorder = subprocess.Popen(  # noqa: S603 (our own node)
         [sys.executable, "-P", "-m", "emir_ros.recorder_node", *words]
     )
-    rclpy.init()
-    node = rclpy.create_node("bench_sender")
-    kind = conversions.message_class(JOINT_STATES.type)
     profile = qos.offered(lockstep=False)
     profile.depth = max(round(rate * qos.DEPTH * PLANT_PERIOD_NS * 1e-9), 1)
-    publisher = node.create_publisher(kind, JOINT_STATES.name, profile)
-    _find_listener(publisher)
     wire, sent = Wire(JOINT_STATES), 0
-    begin = time.monotonic()
-    while (now := time.monotonic() - begin) < seconds:
-        while sent < now * rate:
-            publisher.publish(wire.encode(time.time_ns(), {"angle": float(sent)}))
-            sent += 1
-        time.sleep(1e-4)
-    publisher.wait_for_all_acked(Duration(seconds=SETTLING))
-    recorder.send_signal(signal.SIGINT)
-    recorder.wait()
-    node.destroy_node()
-    rclpy.try_shutdown()
+    try:
+        with _publisher(JOINT_STATES.name, profile) as publisher:
+            begin = time.monotonic()
+            while (now := time.monotonic() - begin) < seconds:
+                while sent < now * rate:
+                    publisher.publish(wire.encode(time.time_ns(), {"angle": float(sent)}))
+                    sent += 1
+                time.sleep(1e-4)
+            publisher.wait_for_all_acked(Duration(seconds=SETTLING))
+    finally:
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait()
     numbers = _recorded(bag, JOINT_STATES.name, NUMBER).values[NUMBER]
     first = int(numbers.min())
     return f"Recorder, messages sent for {seconds:g} s", [
@@ -271,6 +265,21 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
         Figure("lost", float(sent - first - numbers.size), "1"),
         Figure("sent before the first one recorded", float(first), "1"),
     ]
+
+
+@contextmanager
+def _publisher(topic: str, profile: QoSProfile) -> Iterator[Any]:
+    """Give what publishes joint states on a topic that somebody listens to."""
+    rclpy.init()
+    node = rclpy.create_node("bench_sender")
+    try:
+        kind = conversions.message_class(JOINT_STATES.type)
+        publisher = node.create_publisher(kind, topic, profile)
+        _find_listener(publisher)
+        yield publisher
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def _find_listener(publisher: Any) -> None:

@@ -6,8 +6,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Collection, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -228,10 +228,22 @@ def _run_in_many_processes(plan: Plan, ros: list[str]) -> None:
             processes[name] = subprocess.Popen(command)  # noqa: S603 (our own nodes)
         _wait_for_plant(processes)
     finally:
-        recorder = processes.pop("recorder_node", None)
-        _stop(processes.values())
-        if recorder is not None:  # the last one, since it hears all the others
-            _stop([recorder])
+        with _deaf_to_signals():  # or a second one would leave nodes behind
+            recorder = processes.pop("recorder_node", None)
+            _stop(processes.values())
+            if recorder is not None:  # the last one, since it hears all the others
+                _stop([recorder])
+
+
+@contextmanager
+def _deaf_to_signals() -> Iterator[None]:
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    former = [signal.signal(number, signal.SIG_IGN) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, former, strict=True):
+            signal.signal(number, handler)
 
 
 def _wait_for_nodes(processes: dict[str, subprocess.Popen[bytes]]) -> None:

@@ -96,6 +96,8 @@ def stick_out(shown: Array, noise: float) -> NDArray[np.bool_]:
     """Tell which single readings, (n,), stick out of quieter ones around, far beyond the noise."""
     result = np.zeros(shown.size, dtype=np.bool_)
     aside = np.diff(shown)
+    if aside.size < 2 * AROUND + 2:
+        return result
     away, back = aside[AROUND : -AROUND - 1], aside[AROUND + 1 : -AROUND]
     height = np.where(away * back < 0.0, np.minimum(np.abs(away), np.abs(back)), 0.0)
     windows = sliding_window_view(np.abs(aside), 2 * AROUND + 2)

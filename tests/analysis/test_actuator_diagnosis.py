@@ -13,9 +13,10 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from emir_analysis.cli import main
-from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
+from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, search, summary
 from emir_analysis.diagnosis.actuator.fitting import fit, narrowed
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
+from emir_analysis.diagnosis.actuator.search import _with_sizes_that_tell
 from emir_analysis.errors import IncompleteError
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
@@ -46,6 +47,15 @@ def _diagnose(folder: Path, bag: Path, judge: Path | None) -> ActuatorDiagnosis:
         predictions=folder / "runs",
         progress=lambda _: None,
     )
+
+
+EXACT = f"""\
+machine: actuator
+time_unit: sample
+valve: {{gain: {recorded.GAIN}, time_constant: {recorded.LAG}}}
+load: {{frequency: {recorded.FREQUENCY}, viscous_friction: {recorded.FRICTION}}}
+sensor: {{pressure_noise: {recorded.NOISE}}}
+"""
 
 
 def _proportional(spool: float, _: float) -> float:
@@ -111,14 +121,7 @@ def test_an_effect_is_found_and_carries_to_the_other_recording(
 def test_a_sheet_that_leaves_nothing_open_is_asked_what_it_lacks(
     folder: Path, law: recorded.Flow, lacking: list[str]
 ) -> None:
-    exact = f"""\
-machine: actuator
-time_unit: sample
-valve: {{gain: {recorded.GAIN}, time_constant: {recorded.LAG}}}
-load: {{frequency: {recorded.FREQUENCY}, viscous_friction: {recorded.FRICTION}}}
-sensor: {{pressure_noise: {recorded.NOISE}}}
-"""
-    (folder / "sheet.yaml").write_text(exact)
+    (folder / "sheet.yaml").write_text(EXACT)
     result = _diagnose(folder, *recorded.record(folder, law))
     assert result.verdict == ("found" if lacking else "nothing_missing"), summary(result)
     assert [effect.name for effect in result.effects] == lacking
@@ -131,13 +134,18 @@ def test_a_limit_that_is_not_reached_is_not_told(folder: Path) -> None:
     def lifting_alone(spool: float, _: float) -> float:
         return min(recorded.GAIN * spool, 0.5)
 
-    result = _diagnose(folder, *recorded.record(folder, lifting_alone))
-    (effect,) = result.effects
-    assert effect.name == "flow_limit", summary(result)
-    assert effect.parameters["lifting"].value == pytest.approx(0.5, rel=0.03)
-    assert "lowering" not in effect.parameters
-    signal = result.signals["oil_pressure"]
-    assert signal.with_effect < 1.2 * recorded.NOISE < 0.2 * signal.refitted
+    bag, _ = recorded.record(folder, lifting_alone)
+    sheet = load_actuator(folder / "sheet.yaml")
+    record = open_record(bag, read_signal_map(folder / "signals.yaml"))
+    known = [fit(sheet, (), record, recorded.NOISE, drawn=8).machine]
+    both = fit(sheet, ("flow_limit",), record, recorded.NOISE, known, levels=True)
+    told = _with_sizes_that_tell(sheet, record, recorded.NOISE, both)
+    assert told.effects == ("flow_limit",)
+    assert told.machine.effects.flow_limit.lifting == pytest.approx(0.5, rel=0.03)
+    fitted = {unknown.path for unknown in told.unknowns}
+    assert "effects.flow_limit.lifting" in fitted
+    assert "effects.flow_limit.lowering" not in fitted
+    assert told.rms < 1.2 * recorded.NOISE
 
 
 def test_what_no_recording_can_tell_apart_is_ambiguous(folder: Path) -> None:
@@ -171,8 +179,11 @@ def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
     assert (valve.high, valve.low) == pytest.approx((0.4, 0.6), rel=0.02)
 
 
-def test_a_law_that_no_effect_has_is_unexplained_and_measured(folder: Path) -> None:
+def test_a_law_that_no_effect_has_is_unexplained_and_measured(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Edges whose opening grows with its square: what comes closest is told, not named."""
+    monkeypatch.setattr(search, "MOST_EFFECTS", 1)  # more of them take a minute
     bag, judge = recorded.record(folder, lambda spool, _: 2.0 * spool * abs(spool))
     result = _diagnose(folder, bag, judge)
     assert result.verdict == "unexplained", summary(result)
@@ -192,6 +203,7 @@ def test_a_law_that_no_effect_has_is_unexplained_and_measured(folder: Path) -> N
 
 
 def test_what_the_judge_recording_alone_shows_is_told(folder: Path) -> None:
+    (folder / "sheet.yaml").write_text(EXACT)
     bag, _ = recorded.record(folder, _proportional)
     opening = recorded.moves(300, 3)
     recorded.write(folder / "other", opening, recorded.pressure(opening, _limited))
@@ -283,6 +295,7 @@ def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -
 def test_a_judge_of_no_use_does_not_lose_what_was_found(
     folder: Path, samples: int, seconds: int, reason: str
 ) -> None:
+    (folder / "sheet.yaml").write_text(EXACT)
     bag, _ = recorded.record(folder, _proportional)
     opening = recorded.moves(samples, 3)
     recorded.write(folder / "judge", opening, np.sin(opening), seconds=seconds)

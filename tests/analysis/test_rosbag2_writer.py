@@ -41,6 +41,14 @@ def _write(writer: Rosbag2Writer, count: int) -> None:
         writer.write("/a", _header(k), k * SECOND, k * SECOND)
 
 
+@pytest.mark.parametrize("told", ["x, y", "[1]", '{"x": "m"}', '{"x": {"unit": "m"}}'])
+def test_what_others_say_of_a_topic_is_no_table_of_ours(told: str, tmp_path: Path) -> None:
+    with Rosbag2Writer(tmp_path / "bag") as writer:
+        writer.add_topic("/a", HEADER, {"fields": told})
+        writer.write("/a", _header(0), 0, 0)
+    assert info(tmp_path / "bag").topics["/a"].fields == {}
+
+
 @pytest.mark.parametrize("compression", ["none", "zstd"])
 def test_a_recording_split_by_time_is_one_to_its_readers(compression: str, tmp_path: Path) -> None:
     with Rosbag2Writer(tmp_path / "bag", compression, max_duration=2.0) as writer:

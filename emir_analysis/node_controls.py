@@ -64,13 +64,13 @@ from emir_plant.core import Truth
 from emir_plant.sensors import Measurement
 
 
-def situation(
-    reference: Reference, preview: Sequence[float], reading: Measurement, move: Move = NO_MOVE
-) -> Signals:
+def situation(reference: Reference, preview: Sequence[float], reading: Measurement) -> Signals:
     """Return what controllers are told in a period, by signal. preview: strokes to come, m."""
     wanted = {"reference_stroke": reference.stroke, "reference_velocity": reference.velocity}
     ahead = dict(zip(CYLINDER_PREVIEW.fields, preview, strict=True))
-    return reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, move, strict=True))
+    return (
+        reading._asdict() | wanted | ahead | dict(zip(CYLINDER_MOVE.fields, NO_MOVE, strict=True))
+    )
 
 
 def plant_signals(reading: Measurement, truth: Truth) -> Signals:

@@ -15,9 +15,9 @@ WIDE = 0.5  # m, how thick a section is drawn
 LIFT = "0 -1 0"
 
 
-def boom_urdf(geometry: Geometry, name: str = "emir_joint1") -> str:
+def boom_urdf(geometry: Geometry) -> str:
     """Return the description: joint1, then bend1 ... between the sections of an arm."""
-    root = ET.Element("robot", name=name)
+    root = ET.Element("robot", name="emir_joint1")
     ET.SubElement(root, "link", name=ROOT)
     length = geometry.section_length
     parent = ROOT

@@ -13,6 +13,8 @@ from emir_common.quantity import ParameterError
 if TYPE_CHECKING:
     from emir_ros.control_shell import ControlNode
 
+Refusal = Callable[[list[Parameter]], SetParametersResult]
+
 
 class LiveParameters:
     """Quantities of a dataclass, already declared, of which some may change.
@@ -30,15 +32,8 @@ class LiveParameters:
     ) -> None:
         self._node, self._tree, self._apply = node, tree, apply
         self._paths = {path for path in declared(tree) if is_live(path, live)}
-        node.add_on_set_parameters_callback(self._check)
+        node.add_on_set_parameters_callback(refused_by(self._changed))
         node.add_post_set_parameters_callback(self._take)
-
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        try:
-            self._changed(parameters)
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
 
     def _take(self, parameters: list[Parameter]) -> None:
         values = self._mine(parameters)
@@ -52,6 +47,19 @@ class LiveParameters:
 
     def _mine(self, parameters: list[Parameter]) -> dict[str, Any]:
         return {p.name: p.value for p in parameters if p.name in self._paths}
+
+
+def refused_by(check: Callable[[list[Parameter]], object]) -> Refusal:
+    """Return the callback that refuses the parameters for which a check raises ParameterError."""
+
+    def refuse(parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            check(parameters)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    return refuse
 
 
 def is_live(path: str, live: Collection[str]) -> bool:

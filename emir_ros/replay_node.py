@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.records import Channel, Schema
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -25,6 +24,7 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, quantity
 from emir_msgs_py import conversions
 from emir_ros import qos
+from emir_ros.live_parameters import refused_by
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, declare_tree, reject_unknown
 from emir_ros.shell import NodeError, Shell
@@ -61,7 +61,7 @@ class ReplayNode(Shell):
         chosen: list[str] = declare(self, "topics", [""], "full names to replay; empty: all")
         self._paused: bool = declare(self, "start_paused", False, "wait for ~/pause false")
         declare_tree(self, Pace(), live=["rate"])
-        self.add_on_set_parameters_callback(self._check_pace)
+        self.add_on_set_parameters_callback(refused_by(_check_pace))
         reject_unknown(self)
         if not bag:
             raise ParameterError("replay_node: bag: the recording to replay is missing")
@@ -88,14 +88,6 @@ class ReplayNode(Shell):
         """Wait until what was published last has been received."""
         for publisher in self._by_topic.values():
             publisher.wait_for_all_acked(PATIENCE)
-
-    def _check_pace(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Refuse a speed out of range; rclpy looks at floats alone, and an integer will do."""
-        try:
-            with_values(Pace(), {p.name: p.value for p in parameters if p.name == "rate"})
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
 
     def _open(self, bag: Path, chosen: set[str]) -> Iterator[Recorded]:
         try:
@@ -169,6 +161,11 @@ class ReplayNode(Shell):
             self._next = next(self._messages, None)
         if self._next is None:
             self.end()
+
+
+def _check_pace(parameters: list[Parameter]) -> None:
+    """Raise ParameterError for a speed out of range; rclpy looks at floats alone, not integers."""
+    with_values(Pace(), {p.name: p.value for p in parameters if p.name == "rate"})
 
 
 def main() -> None:

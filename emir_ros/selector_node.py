@@ -8,7 +8,7 @@ changes it while the machine moves.
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.parameter import Parameter
 
 from emir_analysis.recorded_orders import SET
@@ -16,6 +16,7 @@ from emir_analysis.switching import Choosing, Selector, Switch
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import OFFERED_COMMANDS, OUTER_LOOPS
 from emir_ros.control_shell import ControlNode
+from emir_ros.live_parameters import refused_by
 from emir_ros.main import run
 from emir_ros.node_parameters import declare, naming, reject_unknown
 
@@ -41,7 +42,7 @@ class SelectorNode(ControlNode):
         first: str = self.get_parameter("controller").value
         self._check(first)
         self.law: Choosing = Choosing(self.selector, first)
-        self.add_on_set_parameters_callback(self._refuse_unknown)
+        self.add_on_set_parameters_callback(refused_by(self._check_all))
         self.add_post_set_parameters_callback(self._choose)
         reject_unknown(self)
         for name in names:
@@ -86,13 +87,9 @@ class SelectorNode(ControlNode):
             known = ", ".join(self.selector.controllers)
             raise ParameterError(f"selector_node: controller {name!r}: running are {known}")
 
-    def _refuse_unknown(self, parameters: list[Parameter]) -> SetParametersResult:
-        try:
-            for name in _controllers(parameters):
-                self._check(name)
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _check_all(self, parameters: list[Parameter]) -> None:
+        for name in _controllers(parameters):
+            self._check(name)
 
     def _choose(self, parameters: list[Parameter]) -> None:
         for name in _controllers(parameters):

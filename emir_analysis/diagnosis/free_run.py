@@ -16,6 +16,7 @@ SHOWN = ("angle", "stroke", "pressure_lifting", "pressure_lowering", "deflection
 ANGLE_COLUMN, STROKE_COLUMN = 0, 1  # of what is shown
 COMPARED = slice(1, None)  # columns behind the resolver's angle: in the order of OUTPUTS
 
+BLOCK = 15.0  # s
 STABLE = 2.0  # rad, of the fastest oscillation in a step; Runge-Kutta 4 is unstable above 2.8
 
 
@@ -76,14 +77,14 @@ def _at_rest(plant: Plant, angle: float, pressure_lowering: float) -> Array | No
         return None
 
 
-def block_medians(errors: Sequence[Array], periods: Sequence[float], block: float = 15.0) -> Array:
-    """Return the median over blocks, s, of each column's RMS: one late stick does not decide.
+def block_medians(errors: Sequence[Array], periods: Sequence[float]) -> Array:
+    """Return the median over blocks of each column's RMS: one late stick does not decide.
 
     errors: (n, c) of each recording, sampled every period, s.
     """
     blocks = []
     for error, period in zip(errors, periods, strict=True):
-        size = max(1, round(block / period))
+        size = max(1, round(BLOCK / period))
         starts = range(0, max(len(error) - size // 2, 1), size)
         blocks += [column_rms(error[k : k + size]) for k in starts]
     return np.asarray(np.median(blocks, axis=0))

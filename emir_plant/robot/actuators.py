@@ -230,13 +230,6 @@ def friction_slope(velocity: float, load: float, p: Any) -> float:
 
     load: force of the oil on the piston, N.
     """
-    step = 1e-5
+    step = 1e-5  # m/s
     rise = terms.friction(velocity + step, load, p) - terms.friction(velocity - step, load, p)
     return max(rise / (2.0 * step), 0.0)
-
-
-@compiled
-def flows_of(x: Array, k: int, actuators: NDArray[Any]) -> tuple[float, float]:
-    """Return actuator k's flows through its valve into its chambers, m^3/s."""
-    lifting, lowering, _ = _valve_flows(own(x, k), x[SUPPLY], actuators[k])
-    return lifting, lowering

@@ -25,9 +25,9 @@ FREE = 1e3  # m or rad, a limit that limits nothing
 EFFORT, VELOCITY = "1e7", "10"  # asked for by the format, used by nobody here
 
 
-def urdf(mechanics: Mechanics, name: str = "emir") -> str:
+def urdf(mechanics: Mechanics) -> str:
     """Return the robot's description."""
-    root = ET.Element("robot", name=name)
+    root = ET.Element("robot", name="emir")
     ET.SubElement(root, "link", name="world")
     for joint in range(1, mechanics.topology.model.njoints):
         _add_joint(root, mechanics, joint)

@@ -14,7 +14,7 @@ from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.robot import actuators
-from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY, flows_of
+from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY, _valve_flows, own
 from emir_plant.robot.parameters import Pump, Robot
 from emir_plant.robot.plant import RobotPlant
 from emir_plant.robot.reach import PostureError
@@ -80,14 +80,14 @@ def test_energy_balances() -> None:
     shown = [PLANT.outputs(s) for s in states]
     for k in range(ACTUATORS):
         p = drives[k]
-        own = x[:, 1 + k * EACH : 1 + (k + 1) * EACH]
-        flow = np.array([flows_of(s, k, drives) for s in states[: len(x)]])
+        pressures = x[:, 1 + k * EACH : 1 + (k + 1) * EACH]
+        flow = np.array([_flows_of(s, k, drives) for s in states[: len(x)]])
         stroke = np.array([s.stroke[k] if k > 0 else 0.0 for s in shown])
         lifting = p["volume_lifting_0"] + p["area_lifting"] * stroke
         lowering = p["volume_lowering_0"] - p["area_lowering"] * stroke
-        supplied += own[:, 0] * flow[:, 0] + own[:, 1] * flow[:, 1]
-        in_oil += own[:, 0] * lifting / beta * np.gradient(own[:, 0], dt)
-        in_oil += own[:, 1] * lowering / beta * np.gradient(own[:, 1], dt)
+        supplied += pressures[:, 0] * flow[:, 0] + pressures[:, 1] * flow[:, 1]
+        in_oil += pressures[:, 0] * lifting / beta * np.gradient(pressures[:, 0], dt)
+        in_oil += pressures[:, 1] * lowering / beta * np.gradient(pressures[:, 1], dt)
     lost = np.array([s[SIZE + N :] @ m.damping @ s[SIZE + N :] for s in states])
     stored = np.array([sum(m.energy(s[SIZE : SIZE + N], s[SIZE + N :])) for s in states])
 
@@ -140,6 +140,12 @@ def test_base_turns_at_its_flow_over_its_displacement() -> None:
     assert shown.position[1] > 1.0  # to the left
 
 
+def _flows_of(x: np.ndarray, k: int, drives: np.ndarray) -> tuple[float, float]:
+    """Return actuator k's flows through its valve into its chambers, m^3/s."""
+    lifting, lowering, _ = _valve_flows(own(x, k), x[SUPPLY], drives[k])
+    return lifting, lowering
+
+
 def _flows(plant: RobotPlant, openings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return what each actuator draws, (6,) m^3/s, and the supply pressure, means of 2.5-3 s."""
     zone = ROBOT.main.valve.dead_zone
@@ -148,7 +154,7 @@ def _flows(plant: RobotPlant, openings: np.ndarray) -> tuple[np.ndarray, np.ndar
     drawn, supply = [], []
     for _ in range(125):
         x = plant.advance(x, commands, 4e-3)
-        drawn.append([flows_of(x, k, plant.tables.drives)[0] for k in range(ACTUATORS)])
+        drawn.append([_flows_of(x, k, plant.tables.drives)[0] for k in range(ACTUATORS)])
         supply.append(x[SUPPLY])
     return np.mean(drawn, axis=0), np.mean(supply)
 

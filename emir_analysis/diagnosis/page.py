@@ -141,8 +141,8 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
                 )
             ],
             f"RMS over windows of half a second to a second of {Path(result.recording).name}; "
-            "noise is what the sensors alone would leave. H is the lifting chamber, S the "
-            "lowering one.",
+            "noise is what the sensors alone would leave. Re-fitted here: to the balances; in the "
+            "free runs: to those. H is the lifting chamber, S the lowering one.",
         ),
         Picture(
             balances_picture(findings),

@@ -15,6 +15,7 @@ from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
 STROKE, H, S = range(3)  # columns of an experiment's outputs
 DIFFERENCE = "pressure_difference"
 CHAMBERS = {"lifting_chamber", "lowering_chamber"}
+OWN = "own_pressure"  # of each chamber
 ACTS_IN = {  # balances, by list; the others act in both chambers
     "along": {"force"},
     "friction": {"force"},
@@ -47,9 +48,9 @@ KINDS = (
     Kind("unnamed_force", BY_VELOCITY, "m/s", force.VELOCITY, (("along",),)),
     Kind("unnamed_opening", "piston_stroke", "m", opening.STROKE, (("change",),)),
     Kind("unnamed_opening", "valve_opening", "1", opening.OPENING, (("change",),)),
-    Kind("unnamed_leakage", "own_pressure", "Pa", leakage.PRESSURE, EITHER_OR_BOTH),
+    Kind("unnamed_leakage", OWN, "Pa", leakage.PRESSURE, EITHER_OR_BOTH),
     Kind("unnamed_leakage", DIFFERENCE, "Pa", leakage.DIFFERENCE, (("across",),)),
-    Kind("unnamed_compliance", "own_pressure", "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
+    Kind("unnamed_compliance", OWN, "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
 )
 
 
@@ -107,6 +108,14 @@ def visited(over: str, evidence: Evidence) -> Array:
     if over == DIFFERENCE:
         return np.asarray(outputs[:, H] - outputs[:, S])
     return outputs[:, [STROKE] if over == "piston_stroke" else [H, S]]
+
+
+def visited_by(curve: Curve, evidence: Evidence) -> list[Array]:
+    """Return where recordings were on the signal of each of a curve's parts, SI unit."""
+    signal = visited(curve.over, evidence)
+    if curve.over != OWN:
+        return [signal]
+    return [signal[:, ("lifting", "lowering").index(part)] for part in curve.parts]
 
 
 def ends(kind: Kind, evidence: Evidence) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
 STAGES = ("nominal", "refitted", "with_effect")
-REFITTED = STAGES[1]
+NOMINAL, REFITTED = STAGES[:2]
 BLACK_BOX = "black_box"
 WITHIN = 3.0  # standard deviations, within which a size is the same
 

@@ -69,7 +69,10 @@ def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
         for name, p in effect.parameters.items()
     ]
     columns = ("effect", "balance", "parameter", "value", "interval", "unit", "meaning")
-    caption = "interval: two standard deviations either way from the curvature of the fit"
+    caption = (
+        "interval: two standard deviations either way from the curvature of the fit; "
+        "what the noise leaves open, not what a law is wrong by"
+    )
     return [Table(columns, rows, caption)] if rows else []
 
 

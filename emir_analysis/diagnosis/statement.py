@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.curves import Curve, visited
+from emir_analysis.diagnosis.curves import Curve, visited_by
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.judged import REFITTED, STAGES, Judged, loudest_signal
+from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.moments import Moments, moments
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
@@ -27,6 +27,7 @@ from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples
 BEYOND = 0.05  # share of the judge recordings
+HELPS = 0.9  # of what parameters alone leave: what leaves more does not come close
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
 DRIFTED = 3.0  # times the noise, over a second
@@ -269,8 +270,7 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if findings.misstated:
         return f", that of {judged.evidence.name} {judged.off(STAGES[-1]):.2f}"
     if findings.verdict == "unexplained":
-        elsewhere = _elsewhere(findings, judged)
-        return f"; {judged.evidence.name} goes further{elsewhere}" if elsewhere else ""
+        return _foreseen(findings, judged) + _further(findings, judged)
     if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
@@ -287,6 +287,20 @@ def _judgement(findings: Findings, judged: Judged) -> str:
     if LOAD in findings.chosen.effects:
         more += "; a load from outside may have come at other times there"
     return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: diagnose from that too"
+
+
+def _foreseen(findings: Findings, judged: Judged) -> str:
+    """Return how far off other recordings are, and that the data sheet as it came does better."""
+    off, stated = judged.off(REFITTED), judged.off(NOMINAL)
+    if judged.evidence.name == findings.evidence.name or not off > EXPLAINED:
+        return ""
+    better = f", more than by the data sheet as it came ({stated:.1f})" if stated < off else ""
+    return f"; {judged.evidence.name} is {off:.1f} times the noise off{better}"
+
+
+def _further(findings: Findings, judged: Judged) -> str:
+    elsewhere = _elsewhere(findings, judged)
+    return f"; {judged.evidence.name} goes further{elsewhere}" if elsewhere else ""
 
 
 def _off(findings: Findings, judged: Judged) -> str:
@@ -326,14 +340,16 @@ def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
     return (
         f"; measured as a curve{beside}, {curve.name} over {curve.over}, {sizes}, the free run of"
         f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
-        f"{_beyond(curve, judged)}"
+        f"{_beyond(curve, findings, judged)}"
     )
 
 
-def _beyond(curve: Curve, judged: Judged) -> str:
+def _beyond(curve: Curve, findings: Findings, judged: Judged) -> str:
     """Return that the judge recordings go where nothing was measured, if they do."""
-    signal = visited(curve.over, judged.evidence)
-    outside = np.mean((signal < curve.signal[0]) | (signal > curve.signal[-1]))
+    parts = zip(
+        visited_by(curve, findings.evidence), visited_by(curve, judged.evidence), strict=True
+    )
+    outside = max(float(np.mean((s < np.nanmin(k)) | (s > np.nanmax(k)))) for k, s in parts)
     if outside < BEYOND:
         return ""
     return f", of which {100 * outside:.0f} % lie beyond what it was measured at"
@@ -380,10 +396,15 @@ def _ends(chosen: Trial) -> tuple[str, ...]:
 
 
 def _rejected(rejected: Trial, findings: Findings) -> str:
-    """Return what comes closest, how far it is off, and that what follows is said without it."""
+    """Return what comes closest, how far it is off, and that what follows is said without it.
+
+    Nothing where it hardly helps.
+    """
     left, plain = (
         math.sqrt(mean_square(trial, findings.evidence)) for trial in (rejected, findings.refitted)
     )
+    if left > HELPS * plain:
+        return ""
     off = f"{left:.1f} times the noise in the free run, parameters alone {plain:.1f}"
     residuals = findings.evidence.residuals([rejected.machine])[0]
     speaking = loudest(residuals, findings.floor, findings.limit)

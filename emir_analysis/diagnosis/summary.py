@@ -23,6 +23,7 @@ QUIET = (
     " their noise. Look at what happened at the moments that are named, or else when the simulated"
     " signals depart from the measured ones."
 )
+INTERVALS = "intervals: what the sensors' noise leaves open, not what a law is wrong by"
 
 
 def summary(result: Diagnosis) -> str:
@@ -30,6 +31,7 @@ def summary(result: Diagnosis) -> str:
     lines = [f"{result.verdict}: {result.statement}"]
     lines += cautions(result)
     lines += [line for effect in result.effects for line in _sizes(effect)]
+    lines += [INTERVALS] if result.effects else []
     lines += [parameter_line(m.name, m.wanted, m.wanted.unit) for m in result.misstated]
     lines += ["", f"{'balance':24}{'noise':>11}{'before':>11}{'refitted':>11}{'after':>11}"]
     for name, b in told_balances(result).items():

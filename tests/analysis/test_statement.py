@@ -1,0 +1,77 @@
+"""What a diagnosis says of balances that speak, of what comes closest, and of other recordings."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from emir_analysis.diagnosis import statement
+from emir_analysis.diagnosis.curves import Curve
+from emir_analysis.diagnosis.statement import _beside, _beyond, _foreseen, _rejected
+
+QUIET = {"force": 1.0, "lifting_chamber": 1.0, "lowering_chamber": 1.0, "bending": 1.0}
+
+
+def test_a_sensor_that_only_those_read_that_speak_is_told() -> None:
+    loudness = QUIET | {"lifting_chamber": 13.9, "force": 12.2, "bending": 17.9}
+    said = _beside("lifting_chamber", ["force", "bending"], loudness)
+    assert "force 12.2, bending 17.9; they all read pressure_lifting," in said
+
+
+def test_without_such_a_sensor_the_others_are_told_alone() -> None:
+    chambers = QUIET | {"lifting_chamber": 3.5, "lowering_chamber": 3.2}
+    assert _beside("lifting_chamber", ["lowering_chamber"], chambers) == (
+        "; beside it lowering_chamber 3.2"
+    )
+    loaded = QUIET | {"force": 141.0, "bending": 46.5}
+    assert _beside("force", ["bending"], loaded) == "; beside it bending 46.5"
+    assert _beside("force", [], QUIET | {"force": 141.0}) == ""
+
+
+def _recorded(name: str, lifting: list[float], lowering: list[float]) -> SimpleNamespace:
+    """A recording's evidence, as far as it is looked at here: pressures in bar."""
+    outputs = np.column_stack([np.zeros(len(lifting)), lifting, lowering]) * 1e5
+    return SimpleNamespace(name=name, experiments=[SimpleNamespace(outputs=outputs)])
+
+
+def test_a_leak_is_measured_no_further_than_its_own_chamber_was() -> None:
+    """The other one's pressure was lower: what a leak does there is not known."""
+    learned = SimpleNamespace(evidence=_recorded("a", [70.0, 200.0], [8.0, 60.0]))
+    other = SimpleNamespace(evidence=_recorded("b", [30.0, 40.0, 90.0, 150.0], [10.0] * 4))
+    places = tuple(np.linspace(8e5, 200e5, 3))
+    leak = Curve("unnamed_leakage", "own_pressure", "Pa", places, "m^3/s", {"lifting": (0, 0, 1)})
+    assert "50 % lie beyond" in _beyond(leak, learned, other)
+    both = Curve(*list(vars(leak).values())[:-1], {"lowering": (0, 0, 1)})
+    assert _beyond(both, learned, other) == ""
+
+
+@pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])
+def test_what_hardly_helps_does_not_come_closest(
+    left: float, *, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = SimpleNamespace(effects=("command_delay",), machine=None)
+    findings = SimpleNamespace(
+        evidence=SimpleNamespace(residuals=lambda _: [np.ones((4, 5))]),
+        refitted=None,
+        floor=np.ones(5),
+        limit=np.full(5, 2.0),
+    )
+    monkeypatch.setattr(statement, "mean_square", lambda t, _: left**2 if t is late else 18.7**2)
+    monkeypatch.setattr(statement, "closest", lambda _: "command_delay comes closest")
+    assert bool(_rejected(late, findings)) == said
+
+
+def test_parameters_that_do_worse_than_the_stated_ones_are_told() -> None:
+    learned = SimpleNamespace(evidence=SimpleNamespace(name="a"))
+
+    def off(stated: float, refitted: float) -> SimpleNamespace:
+        errors = {"nominal": stated, "refitted": refitted}
+        return SimpleNamespace(evidence=SimpleNamespace(name="b"), off=errors.get)
+
+    worse = "; b is 41.0 times the noise off, more than by the data sheet as it came (22.0)"
+    assert _foreseen(learned, off(22.0, 41.0)) == worse
+    assert _foreseen(learned, off(50.0, 41.0)) == "; b is 41.0 times the noise off"
+    assert _foreseen(learned, off(50.0, 1.1)) == ""
+    same = off(50.0, 41.0)
+    same.evidence.name = "a"
+    assert _foreseen(learned, same) == ""

@@ -27,6 +27,7 @@ from emir_analysis.diagnosis.where import Where, where
 from emir_analysis.diagnosis.whole import Progress
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
+from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
@@ -72,11 +73,25 @@ class Findings:
     drift: Drift | None
 
 
+def _known(experiments: Sequence[Experiment], machine: Machine) -> dict[str, float]:
+    """Return what recordings say of the machine beforehand, by dotted name.
+
+    An error of the linkage is looked for about the middle of the strokes: about an end its terms
+    would be large and make up for each other.
+    """
+    known: dict[str, float] = {}
+    if all(e.own_stroke for e in experiments):
+        known["sensors.own_stroke"] = 1
+    strokes = np.concatenate([e.outputs[:, 0] for e in experiments])
+    if np.any(np.isfinite(strokes)) and not machine.effects.linkage_error.is_on:
+        middle = 0.5 * (np.nanmin(strokes) + np.nanmax(strokes))
+        known["effects.linkage_error.about"] = float(np.round(middle, 2))
+    return known
+
+
 def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
     """Find out from recordings of one machine what its data sheet lacks."""
-    if all(e.own_stroke for e in experiments):
-        known = {"sensors.own_stroke": 1}
-        sheet = replace(sheet, machine=with_values(sheet.machine, known))
+    sheet = replace(sheet, machine=with_values(sheet.machine, _known(experiments, sheet.machine)))
     evidence = Evidence(experiments, sheet.machine)
     search = Search(evidence, sheet, progress)
     best = search.run()

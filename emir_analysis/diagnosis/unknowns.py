@@ -166,7 +166,8 @@ def _of_effect(effect: str, machine: Machine) -> list[Unknown]:
     stated = kind()
     members = []
     for name, about in quantities(kind).items():
-        if name in kind.other_law or (name == STROKE and not machine.sensors.own_stroke):
+        unseen = name == STROKE and not machine.sensors.own_stroke
+        if unseen or name in kind.other_law or name in kind.given:
             continue
         value = float(kind.trial.get(name, getattr(stated, name)))
         if name in kind.sizes:

@@ -21,6 +21,7 @@ class Effect:
         goes through them in steps of their trial values.
     none_or_above: values of fields below which they count as none.
     other_law: fields that give the effect another law where they are not 0; a search begins at 0.
+    given: fields that say what the others mean, and are not searched.
     is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """
 
@@ -30,6 +31,7 @@ class Effect:
     trial: ClassVar[dict[str, float]]
     stepwise: ClassVar[tuple[str, ...]] = ()
     none_or_above: ClassVar[dict[str, float]] = {}
+    given: ClassVar[tuple[str, ...]] = ()
     is_series: ClassVar[bool] = False
     other_law: ClassVar[tuple[str, ...]] = ()
 

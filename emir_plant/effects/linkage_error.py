@@ -13,9 +13,9 @@ from emir_plant.jit import compiled
 class LinkageError(Effect):
     """Lever arm off by a function of the stroke, r (1 + e(h)).
 
-    e = scale + slope h + curvature h^2 + cubic h^3 + quartic h^4, with h the stated stroke. The
-    stroke is off by the integral of that, so that r = dh/dalpha still holds and the linkage
-    neither makes nor takes power.
+    e = scale + slope u + curvature u^2 + cubic u^3 + quartic u^4, u = h - about, with h the stated
+    stroke. The stroke is off by the integral of that from h = 0 on, so that r = dh/dalpha still
+    holds and the linkage neither makes nor takes power.
     """
 
     balance: ClassVar[Balance] = "kinematics"
@@ -30,10 +30,12 @@ class LinkageError(Effect):
         "cubic": 0.1,
         "quartic": 0.2,
     }
+    given: ClassVar[tuple[str, ...]] = ("about",)
     is_series: ClassVar[bool] = True
 
     # a steeper slope would promise the balances what soft hoses do
-    scale: float = quantity("1", -0.5, 0.5, "relative error of r at h = 0", default=0.0)
+    about: float = quantity("m", -10.0, 10.0, "stroke about which the terms are", default=0.0)
+    scale: float = quantity("1", -0.5, 0.5, "relative error of r there", default=0.0)
     slope: float = quantity("1/m", -0.5, 0.5, "its growth with the stroke", default=0.0)
     curvature: float = quantity("1/m^2", -20.0, 20.0, "and with its square", default=0.0)
     cubic: float = quantity("1/m^3", -100.0, 100.0, "with its third power", default=0.0)
@@ -43,16 +45,22 @@ class LinkageError(Effect):
 @compiled
 def stroke(angle: float, p: Any) -> float:
     """Return the stroke as built, m, at the boom angle, rad."""
-    h = linkage.stroke(angle, p)
+    h, about = linkage.stroke(angle, p), p.linkage_error_about
+    return h + _integral(h - about, p) - _integral(-about, p)
+
+
+@compiled
+def _integral(u: float, p: Any) -> float:
+    """Return the integral of the error over the stroke, m, from u = 0 on."""
     bent = p.linkage_error_curvature / 3.0
-    bent += h * (p.linkage_error_cubic / 4.0 + h * p.linkage_error_quartic / 5.0)
-    return h * (1.0 + p.linkage_error_scale + h * (0.5 * p.linkage_error_slope + h * bent))
+    bent += u * (p.linkage_error_cubic / 4.0 + u * p.linkage_error_quartic / 5.0)
+    return u * (p.linkage_error_scale + u * (0.5 * p.linkage_error_slope + u * bent))
 
 
 @compiled
 def lever_arm(angle: float, p: Any) -> float:
     """Return the lever arm dh/dalpha as built, m, at the boom angle, rad."""
-    h = linkage.stroke(angle, p)
-    bent = p.linkage_error_curvature + h * (p.linkage_error_cubic + h * p.linkage_error_quartic)
-    error = p.linkage_error_scale + h * (p.linkage_error_slope + h * bent)
+    u = linkage.stroke(angle, p) - p.linkage_error_about
+    bent = p.linkage_error_curvature + u * (p.linkage_error_cubic + u * p.linkage_error_quartic)
+    error = p.linkage_error_scale + u * (p.linkage_error_slope + u * bent)
     return linkage.lever_arm(angle, p) * (1.0 + error)

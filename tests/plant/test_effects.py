@@ -132,7 +132,7 @@ def test_effect_names_its_source_and_starts_a_search_inside_its_range(name: str)
     assert kind.trial.keys() <= {field.name for field in fields(kind)}
     _switched_on(name)  # checks the ranges
     defaults = {field.name: field.default for field in fields(kind)}
-    asked = quantities(kind).keys() - set(kind.other_law)
+    asked = quantities(kind).keys() - {*kind.other_law, *kind.given}
     start = {key: kind.trial.get(key, defaults[key]) for key in asked}
     assert all(start.values())  # a search scales each parameter by its start
 
@@ -349,13 +349,15 @@ def test_a_swing_decays_from_where_it_set_in() -> None:
     assert values == pytest.approx([0.0, 1200.0, 700.0, 200.0 - 1e3 / 2**3.5], abs=1e-9)
 
 
-def test_linkage_error_is_the_stated_one_and_keeps_the_power() -> None:
+@pytest.mark.parametrize("about", [0.0, 0.45])
+def test_linkage_error_is_the_stated_one_and_keeps_the_power(about: float) -> None:
     error = {"scale": 0.01, "slope": 0.05, "curvature": -0.04, "cubic": 0.1, "quartic": -0.2}
-    p = _with(linkage_error=error).record[0]
+    p = _with(linkage_error=error | {"about": about}).record[0]
     for angle in np.radians(np.linspace(-10, 90, 21)):
         stated, h = linkage.lever_arm(angle, p), linkage.stroke(angle, p)
         arm = linkage_error.lever_arm(angle, p)
-        factor = 1.01 + 0.05 * h - 0.04 * h**2 + 0.1 * h**3 - 0.2 * h**4
+        u = h - about
+        factor = 1.01 + 0.05 * u - 0.04 * u**2 + 0.1 * u**3 - 0.2 * u**4
         assert arm == pytest.approx(stated * factor, rel=1e-12)
         step = 1e-5
         slope = linkage_error.stroke(angle + step, p) - linkage_error.stroke(angle - step, p)

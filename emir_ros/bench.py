@@ -151,6 +151,7 @@ def _latency(rate: float, seconds: float) -> Part:
     wire, period, sent = Wire(JOINT_STATES), 1.0 / rate, 0
     with ExitStack() as ending:
         ending.callback(listener.terminate)
+        ending.enter_context(_told_if_it_ends())
         publisher = ending.enter_context(_publisher("bench", qos.offered(lockstep=False)))
         while not here.poll(0.01):
             publisher.publish(wire.encode(time.monotonic_ns(), {"angle": 0.0}))
@@ -265,6 +266,14 @@ def _recorder(bag: Path, seconds: float, rate: float = RECORDED_RATE) -> Part:
         Figure("lost", float(sent - first - numbers.size), "1"),
         Figure("sent before the first one recorded", float(first), "1"),
     ]
+
+
+@contextmanager
+def _told_if_it_ends() -> Iterator[None]:
+    try:
+        yield
+    except EOFError:
+        raise NodeError("the process that listens ended early") from None
 
 
 @contextmanager

@@ -33,9 +33,9 @@ class LinkageError(Effect):
     given: ClassVar[tuple[str, ...]] = ("about",)
     is_series: ClassVar[bool] = True
 
-    # a steeper slope would promise the balances what soft hoses do
     about: float = quantity("m", -10.0, 10.0, "stroke about which the terms are", default=0.0)
     scale: float = quantity("1", -0.5, 0.5, "relative error of r there", default=0.0)
+    # a steeper slope would promise the balances what soft hoses do
     slope: float = quantity("1/m", -0.5, 0.5, "its growth with the stroke", default=0.0)
     curvature: float = quantity("1/m^2", -20.0, 20.0, "and with its square", default=0.0)
     cubic: float = quantity("1/m^3", -100.0, 100.0, "with its third power", default=0.0)

@@ -111,7 +111,7 @@ def visited(over: str, evidence: Evidence) -> Array:
 
 
 def visited_by(curve: Curve, evidence: Evidence) -> list[Array]:
-    """Return where recordings were on the signal of each of a curve's parts, SI unit."""
+    """Return where recordings were on the signal of each of a curve's parts, (n,), SI unit."""
     signal = visited(curve.over, evidence)
     if curve.over != OWN:
         return [signal]

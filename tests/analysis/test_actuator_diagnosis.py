@@ -13,10 +13,9 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from emir_analysis.cli import main
-from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, search, summary
+from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
 from emir_analysis.diagnosis.actuator.fitting import fit, narrowed
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
-from emir_analysis.diagnosis.actuator.search import _with_sizes_that_tell
 from emir_analysis.errors import IncompleteError
 from emir_analysis.import_command import import_csv
 from emir_analysis.signals import load, read_signal_map
@@ -134,18 +133,13 @@ def test_a_limit_that_is_not_reached_is_not_told(folder: Path) -> None:
     def lifting_alone(spool: float, _: float) -> float:
         return min(recorded.GAIN * spool, 0.5)
 
-    bag, _ = recorded.record(folder, lifting_alone)
-    sheet = load_actuator(folder / "sheet.yaml")
-    record = open_record(bag, read_signal_map(folder / "signals.yaml"))
-    known = [fit(sheet, (), record, recorded.NOISE, drawn=8).machine]
-    both = fit(sheet, ("flow_limit",), record, recorded.NOISE, known, levels=True)
-    told = _with_sizes_that_tell(sheet, record, recorded.NOISE, both)
-    assert told.effects == ("flow_limit",)
-    assert told.machine.effects.flow_limit.lifting == pytest.approx(0.5, rel=0.03)
-    fitted = {unknown.path for unknown in told.unknowns}
-    assert "effects.flow_limit.lifting" in fitted
-    assert "effects.flow_limit.lowering" not in fitted
-    assert told.rms < 1.2 * recorded.NOISE
+    result = _diagnose(folder, *recorded.record(folder, lifting_alone))
+    (effect,) = result.effects
+    assert effect.name == "flow_limit", summary(result)
+    assert effect.parameters["lifting"].value == pytest.approx(0.5, rel=0.03)
+    assert "lowering" not in effect.parameters
+    signal = result.signals["oil_pressure"]
+    assert signal.with_effect < 1.2 * recorded.NOISE < 0.2 * signal.refitted
 
 
 def test_what_no_recording_can_tell_apart_is_ambiguous(folder: Path) -> None:
@@ -179,11 +173,8 @@ def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
     assert (valve.high, valve.low) == pytest.approx((0.4, 0.6), rel=0.02)
 
 
-def test_a_law_that_no_effect_has_is_unexplained_and_measured(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_law_that_no_effect_has_is_unexplained_and_measured(folder: Path) -> None:
     """Edges whose opening grows with its square: what comes closest is told, not named."""
-    monkeypatch.setattr(search, "MOST_EFFECTS", 1)  # more of them take a minute
     bag, judge = recorded.record(folder, lambda spool, _: 2.0 * spool * abs(spool))
     result = _diagnose(folder, bag, judge)
     assert result.verdict == "unexplained", summary(result)

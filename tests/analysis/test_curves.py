@@ -1,19 +1,15 @@
 """Which curves the sensors of a recording allow, and where they begin."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import recorded
 from operated import moved, without
 
 from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import Experiment, experiment
+from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unnamed import Curves
-from emir_analysis.signals import load, read_signal_map
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
@@ -90,24 +86,6 @@ def test_a_force_by_the_stroke_is_measured() -> None:
         )  # fmt: skip
         law = 3e4 * np.sin(20.0 * np.array(shape.signal))
         assert shape.parts["along"] == pytest.approx(law, abs=0.05 * 3e4)
-
-
-def test_a_tight_spot_is_measured(tmp_path: Path) -> None:
-    """Friction about one place of the stroke, in a machine that other code has simulated."""
-
-    def tight_spot(stroke: float, velocity: float) -> float:
-        return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
-
-    recorded.record_machine(tmp_path / "a", joint1(), 24.0, 6, tight_spot)
-    (tmp_path / "signals.yaml").write_text(recorded.SIGNAL_MAP)
-    run = load(tmp_path / "a", read_signal_map(tmp_path / "signals.yaml"))
-    evidence = Evidence([experiment("a", run, joint1())], joint1())
-    floor = evidence.floor(joint1())
-    balanced = fit_balances(trial(Sheet(joint1(), {}, {}, ()), ()), evidence, floor)
-    shape = curve_of(Curves(balanced, evidence, floor).measured())
-    assert (shape.over, shape.parts.keys()) == ("piston_stroke", {"friction"})
-    law = [tight_spot(stroke, 1.0) for stroke in shape.signal]
-    assert shape.parts["friction"] == pytest.approx(law, abs=0.05 * 40e3)
 
 
 def test_a_force_by_the_stroke_is_measured_beside_an_effect() -> None:

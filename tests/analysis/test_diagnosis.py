@@ -13,6 +13,7 @@ from emir_analysis import bags
 from emir_analysis.diagnosis import Diagnosis, command, summary
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.recording_checks import check_readings
+from emir_analysis.diagnosis.select import AT_NOISE, EXPLAINED
 from emir_analysis.diagnosis.unknowns import unknowns, with_values
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.signals import Signal
@@ -154,6 +155,33 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     assert "emir design --from designs for it" in page
 
 
+def test_an_effect_outside_the_registry_is_called_unexplained(
+    folder: Path, built: Machine, tmp_path: Path
+) -> None:
+    def tight_spot(stroke: float, velocity: float) -> float:
+        return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
+
+    # the second stays where the first was: between 0.49 and 0.58 m of stroke, and 0.46 and 0.59 m
+    recorded.record_machine(tmp_path / "a", built, DURATION, 6, tight_spot)
+    recorded.record_machine(tmp_path / "b", built, DURATION, 4, tight_spot)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
+    assert result.verdict == "unexplained", summary(result)
+    assert result.effects == ()
+    assert "balance force" in result.statement
+    assert result.balances["force"].refitted > 10.0 * result.balances["force"].noise
+    quiet = result.balances["lifting_chamber"]
+    assert quiet.after < 1.5 * quiet.noise
+    # it has no name, but a curve, with which the machine can be foreseen
+    assert result.curve is not None
+    assert result.curve.over == "piston_stroke"
+    assert result.curve.parts.keys() == {"friction"}
+    law = [tight_spot(stroke, 1.0) for stroke in result.curve.signal]
+    assert result.curve.parts["friction"] == pytest.approx(law, abs=0.05 * 40e3)
+    for name, signal in result.signals.items():
+        assert signal.refitted > EXPLAINED * signal.noise, name
+        assert signal.with_effect < AT_NOISE * signal.noise, name
+
+
 def _sheet_without_tolerances(folder: Path) -> Machine:
     """Write the data sheet of a machine that is just as stated; return that."""
     exact = re.sub(r".*{tol: .*\n|, tol: [0-9.]+", "", recorded.DATA_SHEET)
@@ -164,18 +192,16 @@ def _sheet_without_tolerances(folder: Path) -> Machine:
 
 
 def test_what_the_judge_recording_alone_shows_is_not_called_nothing(
-    folder: Path, tmp_path: Path
+    folder: Path, built: Machine, tmp_path: Path
 ) -> None:
     """The operator goes to a tight spot only after the recording to learn from."""
 
     def tight_spot(stroke: float, velocity: float) -> float:
         return 40e3 * float(np.exp(-(((stroke - 0.5) / 0.04) ** 2)) * np.tanh(velocity / 1e-3))
 
-    machine = _sheet_without_tolerances(tmp_path)
-    (tmp_path / "signals.yaml").write_text(recorded.SIGNAL_MAP)
-    recorded.record_machine(tmp_path / "a", machine, 14.0, seed=3)
-    recorded.record_machine(tmp_path / "b", machine, 14.0, 4, tight_spot)
-    result = diagnose(tmp_path, tmp_path / "a", tmp_path / "b")
+    recorded.record_machine(tmp_path / "a", built, DURATION, seed=3)
+    recorded.record_machine(tmp_path / "b", built, DURATION, 4, tight_spot)
+    result = diagnose(folder, tmp_path / "a", tmp_path / "b")
     assert result.verdict == "unexplained", summary(result)
     assert result.effects == ()
     assert f"{tmp_path / 'b'}, " in result.statement

@@ -66,6 +66,16 @@ def test_figures_of_a_known_run() -> None:
     assert found["valve_travel"] == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("length", [12.0, 22.5])
+def test_the_tcp_is_as_far_off_as_the_boom_is_long(length: float) -> None:
+    """The piston comes 0.1 s later than law (11) has it: 2.5 mm, over an arm of 0.6 m."""
+    run = _run(delay=0.5, bending=0.0)
+    found = {m.name: m.value for m in metrics(run, length)}
+    assert found["tcp_error_down"] == pytest.approx(-length * 0.0025 / 0.6, rel=1e-3)
+    unknown = {m.name: m.value for m in metrics(run, None)}
+    assert unknown["tcp_error_down"] is unknown["tcp_error_up"] is None
+
+
 def test_what_moves_before_the_reference_does_not_count_as_rest() -> None:
     run = _run(delay=-0.5, bending=0.0)
     tcp = run["tcp_deflection"]

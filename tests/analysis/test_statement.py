@@ -41,8 +41,8 @@ def test_a_leak_is_measured_no_further_than_its_own_chamber_was() -> None:
     places = tuple(np.linspace(8e5, 200e5, 3))
     leak = Curve("unnamed_leakage", "own_pressure", "Pa", places, "m^3/s", {"lifting": (0, 0, 1)})
     assert "50 % lie beyond" in _beyond(leak, learned, other)
-    both = Curve(*list(vars(leak).values())[:-1], {"lowering": (0, 0, 1)})
-    assert _beyond(both, learned, other) == ""
+    lowering = Curve(*list(vars(leak).values())[:-1], {"lowering": (0, 0, 1)})
+    assert _beyond(lowering, learned, other) == ""
 
 
 @pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])

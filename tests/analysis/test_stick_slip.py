@@ -114,13 +114,8 @@ def test_no_more_friction_stays_than_there_is() -> None:
 
 
 def test_viscous_friction_that_is_not_heard_takes_no_break_away_with_it() -> None:
-    """Begun at what is hidden, with viscous friction that is next to none."""
     searched, sheet, evidence = search(HIDDEN | {"effects.viscous_friction.coefficient": 0.0})
-    start = fullest(trial(sheet, ()), sheet)
-    known = HIDDEN | {"effects.viscous_friction.coefficient": 1e3}
-    members = zip(start.unknowns.members, start.x, strict=True)
-    x = [unknown.at(known[unknown.path]) if unknown.path in known else x for unknown, x in members]
-    law = start.at(np.clip(x, *start.unknowns.bounds))
+    law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     least, *_ = with_less_friction(law, evidence, sheet, searched.floor)
     assert least.effects == ("stribeck_friction",)
 

@@ -84,11 +84,8 @@ def test_every_node_has_an_executable() -> None:
     assert executables().keys() >= set(NODES)
 
 
-@pytest.mark.parametrize(
-    ("name", "stop"),
-    [(name, signal.SIGINT) for name in NODES]
-    + [(name, signal.SIGTERM) for name in ("cascade_node", "plant_node", "recorder_node")],
-)
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=lambda s: str(s.name))
+@pytest.mark.parametrize("name", NODES)
 def test_node_starts_and_stops(
     name: str, stop: signal.Signals, observer: Node, tmp_path: Path
 ) -> None:

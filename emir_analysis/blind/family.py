@@ -22,12 +22,17 @@ LEARN, JUDGE = "a.mcap", "b.mcap"
 
 
 class Secret(NamedTuple):
-    """What is hidden in a machine: kind, names, sizes, and what it makes of a signal's spread."""
+    """What is hidden in a machine: kind, names, sizes, and what it makes of a signal's spread.
+
+    built: the numbers inside their tolerances, by dotted path of the data sheet; an actuator has
+    none.
+    """
 
     kind: str
     hidden: tuple[str, ...]
     sizes: dict[str, float]
     size: float
+    built: dict[str, float]
 
 
 class Family(NamedTuple):
@@ -62,7 +67,8 @@ def _boom(plan: Plan, number: int, folder: Path) -> Secret:
     noise = np.random.default_rng((plan.seed, number, 1))
     for name, run in ((LEARN, made.learn), (JUDGE, made.judge)):
         write(folder / name, run, made.machine, noise)
-    return Secret(made.kind, made.hidden, made.machine.sizes, made.size)
+    built = {path: getattr(made.machine.built, name) for path, name in stated.toleranced.items()}
+    return Secret(made.kind, made.hidden, made.machine.sizes, made.size, built)
 
 
 def _actuator(plan: Plan, number: int, folder: Path) -> Secret:
@@ -74,7 +80,7 @@ def _actuator(plan: Plan, number: int, folder: Path) -> Secret:
     (folder / SHEET).write_text(sheet, encoding="utf-8")
     (folder / SIGNALS).write_text(actuator_recording.SIGNAL_MAP, encoding="utf-8")
     actuator_recording.write((folder / LEARN, folder / JUDGE), made, random)
-    return Secret(made.kind, made.hidden, made.machine.sizes, made.size)
+    return Secret(made.kind, made.hidden, made.machine.sizes, made.size, {})
 
 
 BOOM = Family(Hidden, CATALOGUE, 60.0, 20.0, "s", _boom)

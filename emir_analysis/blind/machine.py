@@ -37,12 +37,15 @@ class NotSolvedError(RuntimeError):
 class Machine:
     """Joint 1 with the boom stretched. sizes: of effects, by "effect.size", SI units.
 
+    built: its numbers before effects change any.
+
     The state is p_H, p_S, spool, its rate, logic block, modal coordinates, their rates, then
     what effects remember.
     """
 
     def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
         self.sizes = sizes or {}
+        self.built = numbers
         self.n = self.changed(numbers)
         self.boom = boom(self.n)
         modes = self.boom.joint.size

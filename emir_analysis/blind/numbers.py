@@ -78,6 +78,17 @@ class Stated:
     tolerances: dict[str, float]
     missing: tuple[str, ...] = ()
 
+    @property
+    def toleranced(self) -> dict[str, str]:
+        """Return the names that have a tolerance by dotted path of the data sheet."""
+        groups = read_map(DATA_SHEET, what="parameters")
+        return {
+            f"{group}.{name}": name
+            for group, members in groups.items()
+            for name in members
+            if name in self.tolerances
+        }
+
     def built(self, random: np.random.Generator) -> Numbers:
         """Return a machine somewhere within the tolerances."""
         factors = {n: 1.0 + tol * random.uniform(-1.0, 1.0) for n, tol in self.tolerances.items()}

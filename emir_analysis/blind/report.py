@@ -14,7 +14,7 @@ STAGES = {"nominal": "as stated", "refitted": "re-fitted", "with_effect": "with 
 
 def report(outcomes: Sequence[Outcome]) -> str:
     """Return confusion matrix, rates and errors as text."""
-    parts = [_confusion(outcomes), _rates(outcomes), _errors(outcomes)]
+    parts = [_confusion(outcomes), _rates(outcomes), _errors(outcomes), _intervals(outcomes)]
     failed = [o for o in outcomes if o.failure]
     parts += [f"machine {o.machine}: {o.failure}" for o in failed]
     return "\n\n".join(part for part in parts if part)
@@ -118,3 +118,14 @@ def _errors(outcomes: Sequence[Outcome]) -> str:
     down = sum(max(o.errors["with_effect"].values()) <= AT_NOISE for o in found)
     lines.append(f"every signal within {AT_NOISE} times the noise: {down} of {len(found)}")
     return "\n".join(lines)
+
+
+def _intervals(outcomes: Sequence[Outcome]) -> str:
+    """Return how many numbers of the machines that were understood lie inside their intervals."""
+    understood = [o for o in outcomes if o.kind != "foreign" and right(o)]
+    told = [interval for o in understood for interval in o.intervals.values()]
+    if not told:
+        return ""
+    inside = sum(low <= built <= high for built, low, high in told)
+    label = "numbers of the machine inside their intervals"
+    return f"{label:50}{inside:4d} of {len(told)}"

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,9 @@ class Outcome:
     """What was hidden in a machine and what the diagnosis said of it.
 
     errors: free-run RMS on the judge recording over the sensor noise, by stage (as stated,
-    re-fitted, with the effects) and signal. failure: what went wrong; then there is no verdict.
+    re-fitted, with the effects) and signal. intervals: of the machine's own numbers inside their
+    tolerances, by dotted path of the data sheet: as built, low and high as they were told.
+    failure: what went wrong; then there is no verdict.
     """
 
     machine: int
@@ -38,6 +40,7 @@ class Outcome:
     errors: dict[str, dict[str, float]]
     seconds: float
     failure: str = ""
+    intervals: dict[str, list[float]] = field(default_factory=dict)
 
 
 def trial(plan: Plan, number: int, threads: int, keep: Path | None = None) -> Outcome:
@@ -111,6 +114,11 @@ def _outcome(
         },
         seconds=round(seconds, 1),
         failure=failure,
+        intervals={
+            path: [built, told["low"], told["high"]]
+            for path, built in secret.built.items()
+            if (told := answer.get("parameters", {}).get(path))
+        },
     )
 
 

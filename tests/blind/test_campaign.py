@@ -102,7 +102,7 @@ def test_a_diagnosis_that_does_not_end_is_an_outcome(
     def endless(*_: object, timeout: float, **__: object) -> None:
         raise subprocess.TimeoutExpired("emir diagnose", timeout)
 
-    secret = Secret("none", (), {}, 0.0)
+    secret = Secret("none", (), {}, 0.0, {})
     boom = family(actuator=False)._replace(made=lambda *_: secret)
     monkeypatch.setattr(trials, "family", lambda **_: boom)
     monkeypatch.setattr(subprocess, "run", endless)

@@ -132,16 +132,20 @@ def _trust_region(
     )
 
 
-def covariance(problem: Problem, steps: Array) -> Array:
+def covariance(problem: Problem, steps: Array, blocks: NDArray[np.int_]) -> Array:
     """Return the covariance, (k, k), of parameters that were fitted, from slopes at the start.
 
     steps: (k,), so short that they are straight: where two parameters do the same, such as a hose
     and the volume it is connected to, slopes that bend by different amounts would seem to part
-    them.
+    them. blocks: (n,) numbers of the blocks that residuals belong to; those of one need not be
+    independent of each other.
     """
     held = _Held(replace(problem, coarse=None, step=steps), problem.start)
     residuals, slopes = held.slopes(problem.start)
-    return held.covariance(slopes, residuals)
+    independent = held.covariance(slopes, residuals)
+    own = np.sqrt(np.diag(independent))
+    wider = np.maximum(held.spread_of_blocks(slopes, residuals, blocks) / own, 1.0)
+    return np.asarray(independent * np.outer(wider, wider))
 
 
 def descended(problem: Problem, accuracy: float) -> Solution:
@@ -300,6 +304,19 @@ class _Held:
         untold = np.flatnonzero(~(_told(slopes) | self._problem.stated))
         covariance[untold, untold] = np.inf
         return np.asarray(covariance, dtype=np.float64)
+
+    def spread_of_blocks(self, slopes: Array, residuals: Array, blocks: NDArray[np.int_]) -> Array:
+        """Return standard deviations, (k,), by how differently blocks of residuals pull.
+
+        Of what a model lacks, residuals next to each other know the same: the curvature takes each
+        for new (Liang and Zeger 1986). slopes: (n + k, k). residuals: (n + k,). blocks: (n,).
+        """
+        inverse = np.linalg.pinv(slopes.T @ slopes)
+        count = int(blocks.max()) + 1
+        pulls = np.zeros((count, slopes.shape[1]))
+        np.add.at(pulls, blocks, slopes[: blocks.size] * residuals[: blocks.size, None])
+        scatter = pulls.T @ pulls * count / max(count - 1, 1) + np.diag(self._weight**2)
+        return np.asarray(np.sqrt(np.diag(inverse @ scatter @ inverse)))
 
 
 class _Course:

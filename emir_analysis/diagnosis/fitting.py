@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from emir_analysis.diagnosis.effect_shapes import shaped
 from emir_analysis.diagnosis.evidence import Evidence
@@ -28,6 +29,7 @@ from emir_analysis.diagnosis.run_errors import (
 )
 from emir_analysis.diagnosis.select import HOPELESS
 from emir_analysis.diagnosis.starts import Starts
+from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 from emir_plant import integration
@@ -104,7 +106,7 @@ def refine_free_run(known: Trial, evidence: Evidence, rival: Trial | None = None
 
 
 def with_spread(known: Trial, evidence: Evidence) -> Trial:
-    """Return a trial fitted to the whole with the covariance that short steps tell.
+    """Return a trial fitted to the whole with the covariance that short steps and blocks tell.
 
     Over a shorter time than an integration step a load that sets in at once does not change.
     """
@@ -114,7 +116,17 @@ def with_spread(known: Trial, evidence: Evidence) -> Trial:
     for i, unknown in enumerate(known.unknowns.members):
         if unknown.shapes and unknown.unit == "s":
             steps[i] = unknown.at(unknown.value(known.x[i]) + integration.STEP) - known.x[i]
-    return replace(known, covariance=covariance(problem, steps)[:k, :k])
+    return replace(known, covariance=covariance(problem, steps, _blocks(evidence))[:k, :k])
+
+
+def _blocks(evidence: Evidence) -> NDArray[np.int_]:
+    """Return which block each of the free run's weighted errors belongs to, (n,)."""
+    found: list[NDArray[np.int_]] = []
+    for e in evidence.experiments:
+        first = found[-1][-1] + 1 if found else 0
+        block = first + (e.time - e.time[0]) // BOOTSTRAP_BLOCK
+        found.append(np.repeat(block.astype(np.int_), np.count_nonzero(evidence.shown)))
+    return np.concatenate(found)
 
 
 def following(known: Trial, evidence: Evidence) -> Trial:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
+from emir_analysis.diagnosis.fit import STRAIGHT_STEP, Problem, Solution, covariance, descended, fit
 from emir_analysis.signals import Array
 
 SIZE = 9  # numbers to be fitted
@@ -66,6 +66,32 @@ def test_the_covariance_is_the_textbook_s(method: Method) -> None:
     told = np.setdiff1d(np.arange(SIZE), UNTOLD)
     expected = np.linalg.inv(slopes[:, told].T @ slopes[:, told])
     assert solution.covariance[np.ix_(told, told)] == pytest.approx(expected, rel=1e-2, abs=1e-9)
+
+
+@pytest.mark.parametrize("shared", [0.0, 1.0])
+def test_a_spread_knows_that_errors_next_to_each_other_are_alike(shared: float) -> None:
+    """A level and a slope fitted 300 times scatter as much as the spread told says.
+
+    shared: deviation of what all errors of a block have in common, beside noise of 1.
+    """
+    count, size = 40, 50
+    blocks = np.repeat(np.arange(count), size)
+    time = np.linspace(-1.0, 1.0, count * size)
+    slopes = np.column_stack([np.ones_like(time), time])
+    random = np.random.default_rng(1)
+    ends, told = [], []
+    for _ in range(300):
+        noise = random.normal(size=time.size) + shared * random.normal(size=count)[blocks]
+        best = np.linalg.lstsq(slopes, noise, rcond=None)[0]
+
+        def model(points: Array, noise: Array = noise) -> Array:
+            return np.asarray(points @ slopes.T - noise)
+
+        problem = Problem(model, best, np.full(2, -FAR), np.full(2, FAR), np.zeros(2, dtype=bool))
+        steps = np.full(2, STRAIGHT_STEP)
+        ends.append(best)
+        told.append(np.sqrt(np.diag(covariance(problem, steps, blocks))))
+    assert np.median(told, axis=0) == pytest.approx(np.std(ends, axis=0), rel=0.15)
 
 
 def test_vectors_drawn_from_a_fit_have_its_spread() -> None:

@@ -37,6 +37,7 @@ def _apart(known: Trial, x: float, evidence: Evidence) -> float:
 def test_what_leaving_an_effect_out_costs(coefficient: float) -> None:
     """Viscous friction so small that the boom moves nearly as without it."""
     known, evidence = _alone("viscous_friction", {"coefficient": coefficient}, "coefficient")
+    known = refine_free_run(known, evidence)
     (member,) = known.unknowns.members
     wanted = _apart(known, member.at(0.0), evidence)
     assert known.cost_without("viscous_friction") == pytest.approx(wanted, rel=0.05)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -95,38 +96,26 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     evidence = Evidence(experiments, sheet.machine)
     search = Search(evidence, sheet, progress)
     best = search.run()
-    chosen, refitted = best[0], search.refitted
     before, unaided = evidence.residuals([sheet.machine, search.balanced.machine])
-    final, after = refitted, unaided
-    if chosen.effects:
-        final = search.whole.plainer(search.whole.fitted(chosen))
-        after = evidence.residuals([fit_balances(final, evidence, search.floor).machine])[0]
-    verdict = _verdict(final, after, evidence, rivals=len(best) - 1)
-    replaced = _misstated(final, verdict, search, evidence, progress)
-    verdict = "unexplained" if replaced else verdict
-    curves, with_curve = Curves(search.balanced, evidence, search.floor), None
-    if verdict == "found" and not at_noise(final, evidence):
-        verdict, with_curve = _doubted(final, curves, progress)
-        if verdict == "found" and _drifts(final, search, evidence):
-            verdict = "unexplained"
-    rejected = None
-    if verdict == "nothing_missing":
-        refitted = final = search.whole.fitted(final)
-    elif verdict == "unexplained":
-        rejected = final if final.effects else None
-        final, after = refitted, unaided
-    if verdict != "unexplained" and not sticks(final):  # whose free run is rough
-        final = with_spread(final, evidence)
+    named, after = _named(best[0], unaided, search, evidence)
+    verdict = _verdict(named, after, evidence, rivals=len(best) - 1)
+    curves = Curves(search.balanced, evidence, search.floor)
+    doubts = _doubts(named, verdict, curves, search, evidence, progress)
+    if doubts.any:
+        verdict = "unexplained"
+    final = _settled(named, verdict, search, evidence)
+    if verdict == "unexplained":
+        after = unaided
     floor, limit = evidence.floor(final.machine), limits(final.machine, evidence)
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     lies = None if speaking is None else _where(evidence, after, floor, speaking)
-    named = verdict != "unexplained" or bool(replaced) or with_curve is not None
-    if speaking is not None and not named:
-        with_curve = _measured(curves, chosen, search, evidence, progress)
-    added = next(iter(replaced), with_curve)
-    asked = verdict == "unexplained" and added is None and bool(np.any(evidence.fitted))
-    if added is not None:
-        final, after = added, evidence.residuals([added.machine])[0]
+    instead = doubts.instead
+    if verdict == "unexplained" and instead is None and speaking is not None:
+        instead = _measured(curves, best[0], search, evidence, progress)
+    asked = verdict == "unexplained" and instead is None and bool(np.any(evidence.fitted))
+    refitted = final if verdict == "nothing_missing" else search.refitted
+    if instead is not None:
+        final, after = instead, evidence.residuals([instead.machine])[0]
     return Findings(
         evidence=evidence,
         sheet=sheet,
@@ -134,7 +123,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         balanced=search.balanced,
         refitted=refitted,
         chosen=final,
-        rejected=rejected,
+        rejected=named if verdict == "unexplained" and named.effects else None,
         tried=tuple(search.tried),
         rivals=tuple(best[1:]),
         undecided=open_shares(final, evidence),
@@ -145,10 +134,72 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         shape=shape,
         swing=swings,
         where=lies,
-        misstated=tuple(replaced),
-        curve=None if with_curve is None else curve(final.machine),
+        misstated=doubts.misstated,
+        curve=None if instead is None or doubts.misstated else curve(final.machine),
         drift=drift(search.balanced, evidence, search.floor) if asked else None,
     )
+
+
+def _named(best: Trial, unaided: Array, search: Search, evidence: Evidence) -> tuple[Trial, Array]:
+    """Return the effects that a search ends with, fitted to the whole, and what the balances lack.
+
+    That is (w, 5). Parameters alone where there are no effects, with which they lack `unaided`.
+    """
+    if not best.effects:
+        return search.refitted, unaided
+    named = search.whole.plainer(search.whole.fitted(best))
+    balanced = fit_balances(named, evidence, search.floor)
+    return named, evidence.residuals([balanced.machine])[0]
+
+
+def _settled(named: Trial, verdict: str, search: Search, evidence: Evidence) -> Trial:
+    """Return the machine that a verdict ends with, and how sure its parameters are."""
+    if verdict == "unexplained":
+        return search.refitted
+    final = search.whole.fitted(named) if verdict == "nothing_missing" else named
+    return final if sticks(final) else with_spread(final, evidence)  # whose free run is rough
+
+
+class _Doubts(NamedTuple):
+    """What speaks against a verdict, if there is any.
+
+    misstated: values of the data sheet one of which says it better, curve: what else does.
+    """
+
+    any: bool = False
+    misstated: tuple[Trial, ...] = ()
+    curve: Trial | None = None
+
+    @property
+    def instead(self) -> Trial | None:
+        """Return the trial that says it better, if there is one."""
+        return next(iter(self.misstated), self.curve)
+
+
+def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
+    named: Trial,
+    verdict: str,
+    curves: Curves,
+    search: Search,
+    evidence: Evidence,
+    progress: Progress,
+) -> _Doubts:
+    """Ask whether a value of the sheet, a curve or a drift says better what a verdict says."""
+    replaced = _misstated(named, verdict, search, evidence, progress)
+    if replaced:
+        return _Doubts(any=True, misstated=tuple(replaced))
+    if verdict != "found" or at_noise(named, evidence):
+        return _Doubts()
+    if sticks(named):
+        progress("asking whether its friction differs with the direction")
+        if curves.uneven(named):
+            return _Doubts(any=True)
+    else:
+        progress("asking whether a curve says it better")
+        instead = curves.measured_instead(named)
+        if instead is not None:
+            return _Doubts(any=True, curve=instead)
+    return _Doubts(any=_drifts(named, search, evidence))
 
 
 def _misstated(
@@ -164,16 +215,6 @@ def _misstated(
     progress("asking whether one value of the data sheet is another")
     rival = search.refitted if verdict == "unexplained" else named
     return misstated(search.balanced, rival, evidence, search.floor)
-
-
-def _doubted(named: Trial, curves: Curves, progress: Progress) -> tuple[str, Trial | None]:
-    """Return the verdict on effects that leave something, and the curve that says it better."""
-    if sticks(named):
-        progress("asking whether its friction differs with the direction")
-        return "unexplained" if curves.uneven(named) else "found", None
-    progress("asking whether a curve says it better")
-    instead = curves.measured_instead(named)
-    return "found" if instead is None else "unexplained", instead
 
 
 def _drifts(named: Trial, search: Search, evidence: Evidence) -> bool:

@@ -52,6 +52,16 @@ def gradual(known: Trial) -> Trial:
     return known
 
 
+def with_sharper_friction(known: Trial, times: float) -> Trial:
+    """Return a trial whose dry friction turns round at a multiple of the speed, inside bounds."""
+    x = known.x.copy()
+    speeds = {f"effects.{name}.smoothing_speed" for name in _dry(known)}
+    for k, unknown in enumerate(known.unknowns.members):
+        if unknown.path in speeds:
+            x[k] = unknown.at(times * unknown.value(x[k]))
+    return known.at(np.clip(x, *known.unknowns.bounds))
+
+
 def along_the_way(known: Trial) -> Trial:
     """Return a trial whose dry friction comes along the way in place of with the velocity.
 
@@ -73,14 +83,6 @@ def along_the_way(known: Trial) -> Trial:
 def is_along_the_way(known: Trial) -> bool:
     """Tell whether a trial's dry friction comes along the way."""
     return any(getattr(known.machine.effects, name).presliding for name in _dry(known))
-
-
-def other_laws(known: Trial) -> list[Trial]:
-    """Return a trial with friction that comes gradually and along the way, what it does not do."""
-    if is_along_the_way(known):
-        return []
-    ways = [along_the_way(known)]
-    return ways if is_gradual(known) else [gradual(known), *ways]
 
 
 def is_gradual(known: Trial) -> bool:

@@ -1,5 +1,6 @@
 """The errors of free runs, from the state at rest that a machine has where a recording starts."""
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -91,6 +92,17 @@ def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arr
         return best
     none = np.zeros(2, dtype=bool)
     return fit(Problem(model, best, -np.ones(2), np.ones(2), none), FREE_RUN_ACCURACY).x
+
+
+def readings(evidence: Evidence) -> float:
+    """Return how many readings of all sensors there are, those that stay the same counted once."""
+    return float(sum(np.sum(e.weights[:, evidence.shown] ** 2) for e in evidence.experiments))
+
+
+def weight_of_noise(evidence: Evidence) -> float:
+    """Return the RMS weighted error, in units of the noise, of a run that lacks nothing."""
+    samples = sum(e.time.size for e in evidence.experiments) * np.count_nonzero(evidence.shown)
+    return math.sqrt(readings(evidence) / samples)
 
 
 def weighted_errors(

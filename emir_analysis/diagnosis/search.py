@@ -6,6 +6,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following, refine_free_run
+from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
@@ -23,7 +24,7 @@ from emir_analysis.diagnosis.select import (
     leaves_quiet,
     rivals,
 )
-from emir_analysis.diagnosis.stick_slip import OFF, begun, with_less_friction
+from emir_analysis.diagnosis.stick_slip import OFF
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms

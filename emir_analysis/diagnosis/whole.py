@@ -7,6 +7,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import glimpsed, refine_free_run, with_fewer_terms
+from emir_analysis.diagnosis.friction_beginning import follows_the_beginning, gradually
 from emir_analysis.diagnosis.friction_laws import (
     VISCOUS,
     along_the_way,
@@ -29,7 +30,7 @@ from emir_analysis.diagnosis.select import (
     excess,
     free_run_score,
 )
-from emir_analysis.diagnosis.stick_slip import Grown, follows_the_beginning, grown, grown_at_noise
+from emir_analysis.diagnosis.stick_slip import Grown, grown, grown_at_noise
 from emir_analysis.diagnosis.trial import Trial, moved, with_all_terms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -235,7 +236,7 @@ class Whole:
         found = grown(law, self._evidence, rival)
         by_tanh = not is_gradual(law) and not is_along_the_way(law)
         if LEFT < found.left < HOPELESS and by_tanh:
-            other = grown(gradual(law), self._evidence, rival)
+            other = grown(gradually(law, self._evidence), self._evidence, rival)
             if other.left < found.left:
                 found, fuller = other, [gradual(more) for more in fuller]
         if found.left > AT_NOISE:

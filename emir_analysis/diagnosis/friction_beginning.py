@@ -154,7 +154,7 @@ def gradually(known: Trial, evidence: Evidence) -> Trial:
 
 def _gradually(by_tanh: Trial, start: Trial, first: Evidence) -> Law:
     """Return friction that came by tanh, as a law that comes gradually, fitted to a beginning."""
-    sharper = with_sharper_friction(start.at(by_tanh.x), SHARPER)
+    sharper = with_sharper_friction(gradual(by_tanh), SHARPER)
     return Law(start, fitted_to(start, first, from_rest(sharper, first), ROUGH_ACCURACY))
 
 

@@ -96,12 +96,11 @@ def led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
 ) -> Solution:
     """Fit to beginnings that grow from a time to another, s.
 
-    Where the machine sticks at other instants than the free run, a fit would not find back to
-    them: of machines drawn from what the beginning before leaves open one goes on whose instants
-    are the machine's (a particle filter's step, Gordon et al. 1993). Where even that leaves more
-    than before, the law is off, not one stick, and less is spent on it from there on. Friction that
-    comes along the way lets a fit find back by itself. Given up where it leaves more over a
-    beginning than the limit allows.
+    Where the machine sticks at other instants than the free run, a fit mostly finds back to them.
+    Where it does not, of machines drawn from what the beginning before leaves open one goes on
+    whose instants are the machine's (a particle filter's step, Gordon et al. 1993). Where even that
+    leaves more than before, the law is off, not one stick, and less is spent on it from there on.
+    Given up where it leaves more over a beginning than the limit allows.
     """
     smooth = is_along_the_way(known)
     fitted, holds = fitted_to(known, evidence.until(time), x, FREE_RUN_ACCURACY, method), True

@@ -10,7 +10,7 @@ from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import friction_beginning, stick_slip
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import Solution
+from emir_analysis.diagnosis.fit import Solution, descended
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.friction_beginning import (
     FIRST,
@@ -214,6 +214,25 @@ def test_a_law_is_led_on_where_no_rival_is_nearly_as_good(
     found = friction_beginning._begun(law, evidence, searched.floor, rival)
     assert found.left == [1.05, 1.0, 1.0]
     assert found.law.misfit == 0.99
+
+
+@pytest.mark.parametrize(("left", "draws"), [([1.0], 0), ([1.3, 1.0], 1), ([1.3, 1.2, 1.1], 2)])
+def test_machines_are_drawn_where_a_fit_does_not_find_back(
+    monkeypatch: pytest.MonkeyPatch, left: list[float], draws: int
+) -> None:
+    """Until one leaves no more than the beginning before, or all are drawn; the best goes on."""
+    _, sheet, evidence = search({})
+    law, drawn, ends = fullest(trial(sheet, ()), sheet), [], iter(left)
+
+    def draw(*arguments: object) -> Array:
+        drawn.append(arguments)
+        return law.x + 1e-3
+
+    monkeypatch.setattr(stick_slip, "drawn", draw)
+    monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: at(law, next(ends)))
+    found = stick_slip._found_again(law, evidence, at(law, 1.0), descended, 2)
+    assert found.misfit == min(left)
+    assert len(drawn) == draws
 
 
 def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

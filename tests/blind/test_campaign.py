@@ -228,6 +228,28 @@ def test_figures_mean_what_they_say() -> None:
     assert "every signal within 1.1 times the noise: 2 of 2" in lines
 
 
+def test_intervals_count_where_the_machine_was_understood() -> None:
+    """As built inside two of three intervals; of a foreign effect none is asked."""
+    right = outcome(0, "none", [], "nothing_missing")
+    wrong = outcome(1, "none", [], "found", ["payload"])
+    foreign = outcome(2, "foreign", ["tight_spot"], "unexplained")
+    right.intervals.update({"a": [1.0, 0.9, 1.1], "b": [1.0, 1.0, 1.1], "c": [1.0, 0.8, 0.9]})
+    for other in (wrong, foreign):
+        other.intervals["a"] = [1.0, 2.0, 3.0]
+    (line,) = report([right, wrong, foreign]).splitlines()[-1:]
+    assert " ".join(line.split()) == "numbers of the machine inside their intervals 2 of 3"
+
+
+def test_what_a_machine_was_built_with_has_the_diagnosis_s_names(tmp_path: Path) -> None:
+    """Those of the data sheet's tolerances, within which they are."""
+    stated = read_numbers(DATA_SHEET)
+    (tmp_path / "sheet.yaml").write_text(data_sheet(stated))
+    tolerances = load_sheet(tmp_path / "sheet.yaml").tolerances
+    assert stated.toleranced.keys() == tolerances.keys()
+    for path, name in stated.toleranced.items():
+        assert stated.tolerances[name] == tolerances[path]
+
+
 def test_machines_may_have_different_sensors() -> None:
     """The figures of a signal are those of the machines that have it."""
     outcomes = [outcome(k, "one", ["payload"], "found", ["payload"]) for k in range(3)]

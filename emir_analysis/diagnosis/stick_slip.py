@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.fitting import free_run_problem
 from emir_analysis.diagnosis.friction_laws import is_along_the_way
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY, weight_of_noise
-from emir_analysis.diagnosis.select import AT_NOISE
+from emir_analysis.diagnosis.select import AT_NOISE, LEFT
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 
@@ -28,6 +28,7 @@ DRAWN = 1500.0  # s, simulated of machines drawn from what a beginning leaves op
 DRAWN_OF_EACH = 500.0  # s, the same of each while several are led, or where the law is off
 DRAWS = 3  # times that they are drawn, until a fit from the best leaves no more than ...
 AS_BEFORE = 1.01  # times what was left before
+ALIKE = 1.003  # times, of what two fits leave that end in one minimum
 EARLY = 20.0  # s, a beginning whose fit knows least of what it leaves open ...
 DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
@@ -152,7 +153,7 @@ def _found_again(
 ) -> Solution:
     """Return the best fit from where it was, or from the best of some draws of machines.
 
-    One of them may be enough.
+    One of them may be enough. Where two leave much and as much, the law is off, not the draw.
     """
     found: list[Solution] = []
     for draw in range(-1, draws):
@@ -162,7 +163,10 @@ def _found_again(
             if np.array_equal(x, fitted.x):
                 continue  # none of them is better than where it was
         found.append(fitted_to(known, evidence, x, FREE_RUN_ACCURACY, method, fitted.curvature))
-        if found[-1].misfit <= AS_BEFORE * fitted.misfit:
+        left = sorted(each.misfit for each in found)
+        if left[0] <= AS_BEFORE * fitted.misfit:
+            break
+        if len(found) > 1 and left[0] > LEFT and left[1] <= ALIKE * left[0]:
             break
     return min(found, key=lambda each: each.misfit)
 

@@ -216,11 +216,17 @@ def test_a_law_is_led_on_where_no_rival_is_nearly_as_good(
     assert found.law.misfit == 0.99
 
 
-@pytest.mark.parametrize(("left", "draws"), [([1.0], 0), ([1.3, 1.0], 1), ([1.3, 1.2, 1.1], 2)])
+@pytest.mark.parametrize(
+    ("left", "draws"),
+    [([1.0], 0), ([1.3, 1.0], 1), ([1.3, 1.2, 1.1], 2), ([1.3, 1.302], 1), ([1.02, 1.021, 1.0], 2)],
+)
 def test_machines_are_drawn_where_a_fit_does_not_find_back(
     monkeypatch: pytest.MonkeyPatch, left: list[float], draws: int
 ) -> None:
-    """Until one leaves no more than the beginning before, or all are drawn; the best goes on."""
+    """Until one leaves no more than the beginning before, or all are drawn; the best goes on.
+
+    Or until two leave as much that is above the noise.
+    """
     _, sheet, evidence = search({})
     law, drawn, ends = fullest(trial(sheet, ()), sheet), [], iter(left)
 

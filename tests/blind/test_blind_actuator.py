@@ -65,7 +65,7 @@ def test_a_machine_comes_with_the_files_of_a_user(tmp_path: Path) -> None:
     plan = Plan(3, 250.0, SOURCE, actuator=True)
     secret = ACTUATOR.made(plan, 5, tmp_path)
     made = puzzle(3, 5, FOREIGN, 500)
-    assert secret == (made.kind, made.hidden, made.machine.sizes, made.size)
+    assert secret == (made.kind, made.hidden, made.machine.sizes, made.size, {})
     assert made.kind == "foreign"
     sheet = load_actuator(tmp_path / SHEET)
     values = {path: value for path, (_, value) in declared(sheet.machine).items()}

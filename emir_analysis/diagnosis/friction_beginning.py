@@ -167,7 +167,7 @@ def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Law]
     """Return fits of a law to the first beginning, the best first, by tanh gradually, too.
 
     From as many starts again where none comes to the noise, unless half of them end in the same
-    minimum.
+    minimum. Not gradually where more than OFF is left: then more is missing.
     """
     if evidence.told[FORCE]:
         starts = friction_starts(start, evidence, floor, FIRST)
@@ -185,7 +185,7 @@ def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Law]
         if least <= LEFT_EARLY or least > OFF or half_there:
             break
     laws = _distinct([Law(start, fitted) for fitted in fits])
-    if not is_along_the_way(start):
+    if not is_along_the_way(start) and least <= OFF:
         late = gradual(start)
         laws = _distinct([*laws, *(_gradually(law.trial, late, first) for law in laws)])
     return laws

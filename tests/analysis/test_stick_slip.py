@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.friction_laws import (
     fullest,
     gradual,
     is_along_the_way,
+    is_gradual,
     nested,
 )
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
@@ -183,6 +184,18 @@ def test_what_is_far_off_over_the_beginning_is_no_matter_of_friction(
     monkeypatch.setattr(friction_beginning, "_begun", fitted)
     assert begun(start, evidence, searched.floor) is None
     assert tried == [False, True]
+
+
+@pytest.mark.parametrize(("left", "gradually"), [(1.0, True), (1.4, True), (2.3, False)])
+def test_friction_is_begun_gradually_unless_far_off(
+    monkeypatch: pytest.MonkeyPatch, left: float, *, gradually: bool
+) -> None:
+    searched, sheet, evidence = search({})
+    start = fullest(trial(sheet, ()), sheet)
+    monkeypatch.setattr(friction_beginning, "friction_starts", lambda *_: [start])
+    monkeypatch.setattr(friction_beginning, "fitted_to", lambda law, *_: at(law, left))
+    laws = friction_beginning._over_the_first(start, evidence, searched.floor)
+    assert any(is_gradual(law.start) for law in laws) is gradually
 
 
 @pytest.mark.parametrize(("left", "rival"), [(1.6, []), (1.6, [2.0]), (1.28, [1.3])])

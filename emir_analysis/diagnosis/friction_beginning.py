@@ -9,6 +9,7 @@ not needed is left out.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from emir_analysis.diagnosis.friction_laws import (
 from emir_analysis.diagnosis.friction_starts import friction_starts
 from emir_analysis.diagnosis.run_errors import readings
 from emir_analysis.diagnosis.select import AT_NOISE, CORRELATION_TIME, STRONG, score
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.stick_slip import (
     DECIDED,
     DRAWN_OF_EACH,
@@ -118,15 +120,14 @@ def _begun(start: Trial, evidence: Evidence, floor: Array, rival: Sequence[float
         if _given_up(left, rival):
             return Begun(Law(start, replace(laws[0].fitted, misfit=math.inf)), left)
         longer = GROWTH * time
-        part = evidence.until(longer)
-        begins = [_begin(*law, evidence, time, longer) for law in laws[:count]]
-        laws = _distinct([_refitted(law, part, x) for law, x in zip(laws, begins, strict=False)])
-        time = longer
+        on = partial(_led_on, evidence=evidence, time=time, longer=longer)
+        laws, time = _distinct(side_by_side(on, laws[:count])), longer
         left.append(laws[0].misfit)
-    ends = [
-        law._replace(fitted=led(law.start, evidence, law.fitted.x, time, DECIDED, fit))
-        for law in _as_good(laws, part)
-    ]
+
+    def end(law: Law) -> Law:
+        return law._replace(fitted=led(law.start, evidence, law.fitted.x, time, DECIDED, fit))
+
+    ends = side_by_side(end, _as_good(laws, evidence.until(time)))
     return Begun(_as_good(ends, evidence.until(DECIDED))[0], left)
 
 
@@ -158,6 +159,12 @@ def _gradually(by_tanh: Trial, start: Trial, first: Evidence) -> Law:
     return Law(start, fitted_to(start, first, from_rest(sharper, first), ROUGH_ACCURACY))
 
 
+def _led_on(law: Law, evidence: Evidence, time: float, longer: float) -> Law:
+    """Return a law that was fitted until a time, s, fitted to a longer beginning, s."""
+    begin = _begin(law.start, law.fitted, evidence, time, longer)
+    return _refitted(law, evidence.until(longer), begin)
+
+
 def _refitted(law: Law, evidence: Evidence, x: Array) -> Law:
     """Return a law fitted to a beginning from x, (k,)."""
     return law._replace(fitted=fitted_to(law.start, evidence, x, ROUGH_ACCURACY))
@@ -176,18 +183,22 @@ def _over_the_first(start: Trial, evidence: Evidence, floor: Array) -> list[Law]
     first = evidence.until(FIRST)
     points = [from_rest(each, evidence) for each in starts]
     fits: list[Solution] = []
+
+    def fitted(x: Array) -> Solution:
+        return fitted_to(start, first, x, ROUGH_ACCURACY)
+
     together = SMOOTH if is_along_the_way(start) else STARTS
     for k in (0, together):
-        fits += [fitted_to(start, first, x, ROUGH_ACCURACY) for x in points[k : k + together]]
+        fits += side_by_side(fitted, points[k : k + together])
         left = np.array([each.misfit for each in fits])
         least = np.min(left)
         half_there = np.median(left) <= NEARLY * least
         if least <= LEFT_EARLY or least > OFF or half_there:
             break
-    laws = _distinct([Law(start, fitted) for fitted in fits])
+    laws = _distinct([Law(start, each) for each in fits])
     if not is_along_the_way(start) and least <= OFF:
-        late = gradual(start)
-        laws = _distinct([*laws, *(_gradually(law.trial, late, first) for law in laws)])
+        late = partial(_gradually, start=gradual(start), first=first)
+        laws = _distinct([*laws, *side_by_side(late, [law.trial for law in laws])])
     return laws
 
 

@@ -28,6 +28,7 @@ from emir_analysis.diagnosis.select import (
     free_run_score,
     leaves_quiet,
 )
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.signals import Array
@@ -194,7 +195,8 @@ class Rounds:
         """
         near = self._head.until(astray(best.trial, self._head) + SHORTEST)
         found = screen_free_run(best.trial, self._sheet, near)
-        return [self.scored(self._led(s.trial, best)) for s in found[:MOST_SIMULATED]]
+        begun = [s.trial for s in found[:MOST_SIMULATED]]
+        return side_by_side(lambda each: self.scored(self._led(each, best)), begun)
 
     def _led(self, begun: Trial, best: Tried) -> Trial:
         """Return a trial as it was begun on the free run, or as the balances have it, if better.
@@ -219,10 +221,7 @@ class Rounds:
             if frozenset(screened.trial.effects) not in known:
                 known.add(frozenset(screened.trial.effects))
                 new.append(screened.trial)
-        round_ = []
-        for trial_ in new[:MOST_FITTED]:
-            self._progress(f"balances: {trial_.name}")
-            round_.append(self.scored(fit_balances(trial_, self._head, self._floor)))
+        round_ = side_by_side(self._on_its_balances, new[:MOST_FITTED])
         least = min((t.balances for t in round_), default=np.inf)
         limit = min(best.balances - STRONG, least + CLOSE)
         close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)
@@ -235,6 +234,10 @@ class Rounds:
             better = self._better(ahead, best)
         self.tried += others
         return better
+
+    def _on_its_balances(self, begun: Trial) -> Tried:
+        self._progress(f"balances: {begun.name}")
+        return self.scored(fit_balances(begun, self._head, self._floor))
 
     def _ahead(self, others: list[Tried], best: Tried) -> list[Tried]:
         """Return the trial whose free run is best, if it is better than the best so far.
@@ -251,10 +254,7 @@ class Rounds:
 
     def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
         """Fit trials to the free run; return those that are better than the best so far."""
-        simulated = []
-        for tried in promising:
-            self._progress(f"free run: {tried.trial.name}")
-            simulated.append(self._simulated(tried))
+        simulated = side_by_side(self._simulated, promising)
         self.tried += simulated
         better = [t for t in simulated if free(t) < free(best) - STRONG]
         better = better or [t for t in simulated if self._suffices(t.trial, best.trial)]
@@ -281,6 +281,7 @@ class Rounds:
         the free run away and the parameters with it: they stay as the balances say, if those are
         all told. Nor do fewer terms of a series lead anywhere then.
         """
+        self._progress(f"free run: {tried.trial.name}")
         full = fit_free_run(tried.trial, self._head)
         hopeless = excess(full, self._head) > beyond(HOPELESS)
         if self._evidence.complete and hopeless:

@@ -25,6 +25,7 @@ from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.fitting import FREE_RUN_STEP
 from emir_analysis.diagnosis.loads import FOR_EVER, LOAD, Load, constant, likely, of_force, of_steps
 from emir_analysis.diagnosis.run_errors import coarse_errors, settled
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -55,7 +56,8 @@ class OnBalances:
         An effect that does not stay on is not in the list.
         """
         promising = sorted(self._begun, key=lambda c: c.expected)[:MOST_FITTED]
-        found = sorted(((c.fitted(), c) for c in promising), key=lambda pair: pair[0].cost)
+        fits = zip(side_by_side(Candidate.fitted, promising), promising, strict=True)
+        found = sorted(fits, key=lambda pair: pair[0].cost)
         least, silent = found[0][0].cost, SILENT * self._left.nothing.size
         for k, (screened, candidate) in enumerate(found[:MOST_AGAIN]):
             if silent < screened.cost <= NEAR_BEST * least:
@@ -76,7 +78,7 @@ class OnBalances:
         for one, other in pairs[:MOST_FITTED]:
             start = trial(self._sheet, (*known.effects, one.effect, other.effect), known)
             together.append(Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
-        return sorted((c.fitted() for c in together), key=lambda s: s.cost)
+        return sorted(side_by_side(Candidate.fitted, together), key=lambda s: s.cost)
 
 
 def screen_free_run(
@@ -95,7 +97,8 @@ def screen_free_run(
     if faint or not evidence.told[FORCE]:
         loads += _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
-    return sorted((c.stepped(missing) for c in begun), key=lambda s: s.cost)
+    stepped = side_by_side(lambda c: c.stepped(missing), begun)
+    return sorted(stepped, key=lambda s: s.cost)
 
 
 def in_balances(evidence: Evidence, floor: Array) -> Missing:
@@ -148,14 +151,14 @@ def _begun(
     known: Trial, sheet: Sheet, loads: list[Load], left: Left, size: float = 1.0
 ) -> list[Candidate]:
     """Begin each further effect; size: of its starts, in those on the balances."""
-    found = []
-    for name in REGISTRY:
-        if name not in known.effects:
-            start = trial(sheet, (*known.effects, name), known)
-            members = start.unknowns.members[known.x.size :]
-            starts = starting_fields(name, members, loads, size)
-            found.append(Candidate(start, known.x.size, starts, left))
-    return found
+
+    def begin(name: str) -> Candidate:
+        start = trial(sheet, (*known.effects, name), known)
+        members = start.unknowns.members[known.x.size :]
+        starts = starting_fields(name, members, loads, size)
+        return Candidate(start, known.x.size, starts, left)
+
+    return side_by_side(begin, (name for name in REGISTRY if name not in known.effects))
 
 
 def _expected(one: Candidate, other: Candidate, nothing: Array) -> float:

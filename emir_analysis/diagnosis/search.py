@@ -71,7 +71,7 @@ class Search:
             return [self.refitted]  # nothing is left that an effect could explain
         plain = self._rounds.scored(self._plain(), free_run_score(self.refitted, self._evidence))
         self._rounds.tried = [plain]
-        best, equal, enough = self._one_at_a_time(plain)
+        best, equal, enough = self._one_at_a_time(plain, [plain.trial])
         if not best.trial.effects:
             late = self._by_whole(self.refitted)
         else:
@@ -106,13 +106,14 @@ class Search:
             return fit_balances(self.balanced, self._head, self.floor)
         return following(self.balanced, self._head)
 
-    def _one_at_a_time(self, plain: Tried) -> tuple[Tried, list[Trial], bool]:
-        """Add effects to parameters alone, one a round, as long as that is better.
+    def _one_at_a_time(self, best: Tried, equal: list[Trial]) -> tuple[Tried, list[Trial], bool]:
+        """Add effects to a trial, one a round, as long as that is better.
 
-        Return the best trial, those that are as good and whether an effect has made it suffice.
+        equal: trials as good as that. Return the best trial, those that are as good and whether an
+        effect has made it suffice.
         """
-        best, equal, enough = plain, [plain.trial], False
-        self._equal = {plain.trial.effects: equal}
+        enough = False
+        self._equal[best.trial.effects] = equal
         while len(best.trial.effects) < MOST_EFFECTS:
             self._progress(f"all effects beside: {best.trial.name}")
             better = self._rounds.beside_enough(best) if enough else self._rounds.beside(best)
@@ -132,6 +133,7 @@ class Search:
     def _two_at_once(self, plain: Tried, best: Tried) -> list[Trial]:
         """Return the best trials beside another first effect, or else of pairs, if there are any.
 
+        Beside a pair that does not suffice a third effect is looked for.
         plain: parameters alone. best: so far, which does not suffice.
         """
         others = [] if self._evidence.complete else self._beside_others(best)
@@ -144,7 +146,10 @@ class Search:
         equal = _as_good(better)
         pair = next(t for t in better if t.trial is equal[0])
         if sticks(pair.trial):  # however far off: where it sticks drives it away
-            equal, _ = self._by_beginning(equal, pair)
+            equal, pair = self._by_beginning(equal, pair)
+        pair = self._known_whole(pair)
+        if not self._rounds.enough(pair.trial):
+            _, equal, _ = self._one_at_a_time(pair, equal)
         return equal
 
     def _beside_others(self, best: Tried) -> list[Trial]:

@@ -166,7 +166,7 @@ class InternalLeakage(Effect):
     balance: ClassVar[Balance] = "chambers"
     sizes: ClassVar[tuple[str, ...]] = ("conductance", "orifice")
     source: ClassVar[str] = OF_ORDER_ONE
-    trial: ClassVar[dict[str, float]] = {"conductance": 0.02, "orifice": 0.02}
+    trial: ClassVar[dict[str, float]] = {"conductance": 0.1, "orifice": 0.1}
 
     conductance: float = quantity("1/time", 0.0, 2.0, "leakage flow per pressure", default=0.0)
     orifice: float = quantity(

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from emir_analysis.diagnosis.actuator.curves import measured
+from emir_analysis.diagnosis.actuator.misstated import misstated
 from emir_analysis.diagnosis.actuator.page import write_page
 from emir_analysis.diagnosis.actuator.record import (
     PRESSURE,
@@ -79,12 +80,15 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
 
 
 def _found(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
-    """Return the fits of all sets of effects, with a curve where none of them explains all."""
+    """Return the fits of all sets of effects, and what else there is where none explains all."""
     noise = noise_floor(sheet, record)
     found = search(sheet, record, noise, progress)
     if verdict(sheet, found, noise) == "unexplained":
-        progress("measuring what has no name")
-        found = replace(found, curve=measured(sheet, found, record, noise))
+        progress("other values in the data sheet")
+        found = replace(found, misstated=misstated(sheet, found.plain, record, noise))
+        if found.misstated is None:
+            progress("measuring what has no name")
+            found = replace(found, curve=measured(sheet, found, record, noise))
     return found
 
 

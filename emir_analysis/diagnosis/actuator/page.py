@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
-from emir_analysis.diagnosis.actuator.result import LABELS, ActuatorDiagnosis
+from emir_analysis.diagnosis.actuator.result import ActuatorDiagnosis
 from emir_analysis.diagnosis.page import tests_of_errors
 from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
 from emir_analysis.signals import Array
@@ -26,6 +26,7 @@ def write_page(
         Text(f"{result.verdict}: {result.statement}.", lead=True),
         Text(result.not_told.capitalize() + "."),
         *_effects(result),
+        *_misstated(result),
         *(_curve(result.curve) if result.curve else []),
         *_free_run(result, judged, runs),
         *_balances(result),
@@ -51,6 +52,16 @@ def _effects(result: ActuatorDiagnosis) -> list[Block]:
     return [Table(columns, rows, about)] if rows else []
 
 
+def _misstated(result: ActuatorDiagnosis) -> list[Block]:
+    if result.misstated is None:
+        return []
+    m = result.misstated
+    unit = m.wanted.unit.replace("time", result.time_unit)
+    columns = ("value in the data sheet", "stated", "wanted", "interval", "unit", "meaning")
+    row = (m.name, m.stated, m.wanted.told[0], m.wanted.interval, unit, m.wanted.meaning)
+    return [Table(columns, [row], "Explains the recording with the others inside their ranges.")]
+
+
 def _curve(curve: CurveResult) -> list[Block]:
     figure = new_figure(3.2)
     ax = figure.subplots()
@@ -73,16 +84,16 @@ def _free_run(
     result: ActuatorDiagnosis, judged: ActuatorRecord, runs: dict[str, Array]
 ) -> list[Block]:
     s = result.signals[PRESSURE]
-    errors = {name: getattr(s, name) for name in LABELS}
+    errors = {name: getattr(s, name) for name in result.labels}
     return [
         Heading(f"Free run on {Path(result.judged_on).name}"),
         Table(
             ("", "RMS error", "share of the spread"),
-            [(LABELS[n], e, e / result.spread) for n, e in errors.items()],
+            [(result.labels[n], e, e / result.spread) for n, e in errors.items()],
             f"Unit: the file's ({s.unit}); noise of the pressure {s.noise:.2g}.",
         ),
         Picture(
-            _picture(judged, runs, result.time_unit),
+            _picture(judged, runs, result),
             "Simulated under the recorded valve opening alone; below, simulated minus measured.",
         ),
     ]
@@ -92,7 +103,7 @@ def _balances(result: ActuatorDiagnosis) -> list[Block]:
     return [
         Heading("What the balance of the oil lacks"),
         Table(
-            ("balance", "noise", "data sheet", "re-fitted", "with effects"),
+            ("balance", "noise", "data sheet", "re-fitted", result.last),
             [(n, b.noise, b.before, b.refitted, b.after) for n, b in result.balances.items()],
             "RMS over half a slow period, the measured pressure in every term.",
         ),
@@ -128,7 +139,7 @@ def _plain(ax: Axes) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def _picture(judged: ActuatorRecord, runs: dict[str, Array], time_unit: str) -> Figure:
+def _picture(judged: ActuatorRecord, runs: dict[str, Array], result: ActuatorDiagnosis) -> Figure:
     figure = new_figure(7.0)
     time = judged.time - judged.begin
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 3, 2))
@@ -137,13 +148,13 @@ def _picture(judged: ActuatorRecord, runs: dict[str, Array], time_unit: str) -> 
     limit = 2.0 * abs(judged.pressure).max()
     for name, colour in COLOURS.items():
         shown = runs[name].clip(-limit, limit)
-        middle.plot(time, shown, color=colour, lw=1.0, label=LABELS[name])
+        middle.plot(time, shown, color=colour, lw=1.0, label=result.labels[name])
         below.plot(time, shown - judged.pressure, color=colour, lw=0.8)
     middle.plot(time, judged.pressure, color=MEASURED, lw=1.0, ls="--", label="measured")
     middle.set_ylabel(PRESSURE.replace("_", " "))
     middle.legend(ncols=5, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     below.set_ylabel("error")
-    below.set_xlabel(f"time from the beginning of this recording, {time_unit}")
+    below.set_xlabel(f"time from the beginning of this recording, {result.time_unit}")
     for ax in (above, middle, below):
         _plain(ax)
     return figure

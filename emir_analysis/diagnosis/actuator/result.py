@@ -9,7 +9,7 @@ from emir_analysis.diagnosis.actuator.black_box import linear_model, linear_run,
 from emir_analysis.diagnosis.actuator.curves import CurveResult, as_result
 from emir_analysis.diagnosis.actuator.fitting import Fitted, free_run
 from emir_analysis.diagnosis.actuator.record import PRESSURE, ActuatorRecord, noise_of
-from emir_analysis.diagnosis.actuator.search import Search
+from emir_analysis.diagnosis.actuator.search import Misstated, Search
 from emir_analysis.diagnosis.actuator.verdict import BALANCE, statement, verdict
 from emir_analysis.diagnosis.error_tests import ErrorTests
 from emir_analysis.diagnosis.result import (
@@ -17,6 +17,7 @@ from emir_analysis.diagnosis.result import (
     OPEN,
     BalanceResult,
     EffectResult,
+    MisstatedResult,
     ParameterResult,
     SignalResult,
     confounded,
@@ -26,15 +27,17 @@ from emir_analysis.diagnosis.select import EXPLAINED
 from emir_analysis.diagnosis.statistics import input_correlation, rms_intervals, whiteness
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import declared
 from emir_common.quantity import quantities
 from emir_plant.actuator import REGISTRY, Actuator, ActuatorSheet
 from emir_plant.actuator.model import driven
+from emir_plant.actuator.unnamed import CURVES
 
 BOOTSTRAP_BLOCK = 2.0  # slow periods in a block of the bootstrap
-LABELS = {
+LABELS = {  # of the stages; what the last one has depends on what was found
     "nominal": "data sheet",
     "refitted": "re-fitted",
-    "with_effect": "with the effects",
+    "with_effect": "",
     "black_box": "best linear model",
 }
 NOT_TOLD = (
@@ -61,7 +64,8 @@ class ActuatorDiagnosis:
     """What the model of an actuator lacks.
 
     rivals: sets of effects that would do as well, "a + b", where the verdict is ambiguous.
-    curve: what has no name, measured, where the verdict is unexplained.
+    misstated: a value of the data sheet that explains the recording if it is another, or curve:
+    what has no name, measured, where the verdict is unexplained. last: what is the last stage's.
     signals: over the judge recording; one_step: one sample ahead of the measured pressure.
     spread: standard deviation of the judged pressure.
     """
@@ -70,6 +74,7 @@ class ActuatorDiagnosis:
     statement: str
     effects: tuple[EffectResult, ...]
     rivals: tuple[str, ...]
+    misstated: MisstatedResult | None
     curve: CurveResult | None
     candidates: tuple[CandidateResult, ...]
     balances: dict[str, BalanceResult]
@@ -83,6 +88,12 @@ class ActuatorDiagnosis:
     recording: str
     judged_on: str
     judged_from_its_own_start: bool
+    last: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Return what the stages are called."""
+        return LABELS | {"with_effect": self.last}
 
 
 def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:
@@ -91,11 +102,11 @@ def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:
 
 
 def stages(sheet: ActuatorSheet, found: Search) -> dict[str, Actuator]:
-    """Return the machine as stated, re-fitted, and with the effects chosen, or the curve."""
+    """Return the machine as stated, re-fitted, and with the effects chosen or what else is told."""
     return {
         "nominal": sheet.machine,
         "refitted": found.plain.machine,
-        "with_effect": (found.curve or found.chosen).machine,
+        "with_effect": found.last.machine,
     }
 
 
@@ -152,10 +163,10 @@ def diagnosis(
     errors = {name: run - judged.pressure for name, run in runs.items()}
     ahead = one_step_errors(stages(sheet, found), record, judge)
     slow = _slow_period(found)
-    chosen = found.chosen
-    fitted = _parameters(chosen)
+    chosen, fitted = found.chosen, _parameters(found.last)
+    wanted = _misstated(sheet, found.misstated, fitted) if found.misstated else None
     word = verdict(sheet, found, noise)
-    said = statement(word, found, noise, curve)
+    said = statement(word, found, noise, wanted or curve)
     if judge is not None and sheet.machine.sensor.pressure_noise:
         word, said = _judged(word, said, judge.name, rms(errors["with_effect"]) / noise)
     return ActuatorDiagnosis(
@@ -164,6 +175,7 @@ def diagnosis(
         effects=tuple(_effect(name, fitted) for name in chosen.effects)
         if word in ("found", "ambiguous")
         else (),
+        misstated=wanted,
         curve=curve,
         rivals=tuple(" + ".join(r.effects) for r in found.rivals if word == "ambiguous"),
         candidates=_candidates(found),
@@ -178,7 +190,17 @@ def diagnosis(
         recording=record.name,
         judged_on=judged.name,
         judged_from_its_own_start=judge is None or not judge.follows(record),
+        last=_last(found),
     )
+
+
+def _last(found: Search) -> str:
+    """Return what is in the machine of the last stage."""
+    if found.misstated is not None:
+        return f"with another {found.misstated.path}"
+    if found.curve is not None:
+        return "with the curve"
+    return "with the effects" if found.chosen.effects else "with no effect"
 
 
 def _judged(word: str, said: str, judge: str, left: float) -> tuple[str, str]:
@@ -203,20 +225,23 @@ def summary(result: ActuatorDiagnosis) -> str:
     s = result.signals[PRESSURE]
     start = "its own start" if result.judged_from_its_own_start else f"that of {result.recording}"
     lines = [f"{result.verdict}: {result.statement}", f"({result.not_told})", ""]
-    for effect in result.effects:
-        for name, p in effect.parameters.items():
-            lines.append(parameter_line(f"{effect.name}.{name}", p, _unit(p.unit, result)))
+    told = {f"{e.name}.{name}": p for e in result.effects for name, p in e.parameters.items()}
+    if result.misstated:
+        told[result.misstated.name] = result.misstated.wanted
+    told |= {path: p for path, p in result.parameters.items() if path not in told}
+    lines += [parameter_line(name, p, _unit(p.unit, result)) for name, p in told.items()]
     i, ahead = result.tests[PRESSURE].intervals, result.one_step[PRESSURE]
-    figures = "  " + ", ".join(f"{label} {getattr(s, n):.3g}" for n, label in LABELS.items())
+    labels = result.labels
+    figures = "  " + ", ".join(f"{label} {getattr(s, n):.3g}" for n, label in labels.items())
     lines += [
         "",
         f"free run of {PRESSURE} on {result.judged_on}, from {start}, by the valve opening alone",
         f"RMS error in units of the file (its spread {result.spread:.3g}, noise {s.noise:.2g}):",
         figures,
         "  95 % by block bootstrap: "
-        + ", ".join(f"{label} {i[n].low:.3g} ... {i[n].high:.3g}" for n, label in LABELS.items()),
-        "one sample ahead of the measured pressure:",
-        "  " + ", ".join(f"{label} {getattr(ahead, n):.3g}" for n, label in LABELS.items()),
+        + ", ".join(f"{label} {i[n].low:.3g} ... {i[n].high:.3g}" for n, label in labels.items()),
+        f"one sample ahead of the measured pressure (noise, of two readings, {ahead.noise:.2g}):",
+        "  " + ", ".join(f"{label} {getattr(ahead, n):.3g}" for n, label in labels.items()),
     ]
     return "\n".join(lines)
 
@@ -249,6 +274,8 @@ def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:
     found = {}
     together = confounded([unknown.path for unknown in fitted.unknowns], fitted.covariance)
     deviations = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
+    for path, others in together.items():  # of a curve's points nobody would read a list
+        together[path] = tuple(other for other in others if other.split(".")[1] not in CURVES)
     for unknown, x, deviation in zip(fitted.unknowns, fitted.x, deviations, strict=True):
         ends = [min(max(x + s * INTERVAL * deviation, unknown.low), unknown.high) for s in (-1, 1)]
         low, high = sorted(unknown.value(float(end)) for end in ends)
@@ -256,6 +283,14 @@ def _parameters(fitted: Fitted) -> dict[str, ParameterResult]:
         note = OPEN if (unknown.low, unknown.high) == tuple(ends) else ""
         found[unknown.path] = ParameterResult(value, unknown.unit, low, high, with_it, "", note)
     return found
+
+
+def _misstated(
+    sheet: ActuatorSheet, found: Misstated, fitted: dict[str, ParameterResult]
+) -> MisstatedResult:
+    about, stated = declared(sheet.machine)[found.path]
+    wanted = replace(fitted[found.path], meaning=about.meaning)
+    return MisstatedResult(found.path, float(stated), wanted)
 
 
 def _effect(name: str, fitted: dict[str, ParameterResult]) -> EffectResult:

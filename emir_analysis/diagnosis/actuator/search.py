@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numba
 import numpy as np
@@ -29,13 +29,21 @@ Progress = Callable[[str], None]
 Thing = TypeVar("Thing")
 
 
+class Misstated(NamedTuple):
+    """The parameters with another value of the data sheet, by dotted path, fitted along."""
+
+    path: str
+    fitted: Fitted
+
+
 @dataclass(frozen=True)
 class Search:
     """The fits of all sets that were tried, the best first; rivals: as good and no larger.
 
     unseen: RMS error of parts left out of the fit, each simulated by a machine that has not seen
-    it, by the sets' names: of parameters only, of the chosen set and of its rivals. curve: the
-    machine with what has no name as a curve, where one is measured.
+    it, by the sets' names: of parameters only, of the chosen set and of its rivals. Where no
+    effects explain the recording, misstated: another value of the data sheet that does, or curve:
+    the machine with what has no name as a curve, if one is measured.
     """
 
     plain: Fitted
@@ -44,6 +52,14 @@ class Search:
     rivals: tuple[Fitted, ...]
     unseen: dict[str, float]
     curve: Fitted | None = None
+    misstated: Misstated | None = None
+
+    @property
+    def last(self) -> Fitted:
+        """Return what explains the recording best."""
+        if self.misstated is not None:
+            return self.misstated.fitted
+        return self.curve or self.chosen
 
 
 def search(

@@ -3,6 +3,7 @@
 from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.fitting import Fitted
 from emir_analysis.diagnosis.actuator.search import MUCH, Search
+from emir_analysis.diagnosis.result import MisstatedResult
 from emir_analysis.diagnosis.select import AT_NOISE
 from emir_plant.actuator import ActuatorSheet
 
@@ -26,8 +27,10 @@ def _explained(sheet: ActuatorSheet, found: Search, noise: float) -> bool:
     return not sheet.machine.sensor.pressure_noise and chosen <= MUCH * plain
 
 
-def statement(word: str, found: Search, noise: float, curve: CurveResult | None) -> str:
-    """Return what a verdict means, in numbers."""
+def statement(
+    word: str, found: Search, noise: float, instead: CurveResult | MisstatedResult | None
+) -> str:
+    """Return what a verdict means, in numbers. instead: what explains more than effects do."""
     plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
     if word == "nothing_missing":
         return "parameters inside their ranges bring the free run to the noise"
@@ -38,11 +41,13 @@ def statement(word: str, found: Search, noise: float, curve: CurveResult | None)
     if word == "unexplained":
         come = "come" if len(found.chosen.effects) > 1 else "comes"
         closest = f"{found.chosen.name} {come} closest; " if found.chosen.effects else ""
-        told = _told(curve) if curve else ""
-        return (
-            f"{closest}{left}: the balance of the {BALANCE}, the only one that opening and"
-            f" pressure allow, speaks, and no known effect says why{told}"
+        speaks = (
+            f"the balance of the {BALANCE}, the only one that opening and pressure allow, speaks"
         )
+        if isinstance(instead, MisstatedResult):
+            return f"{speaks}; {_another(instead, found.last.rms, noise)}"
+        told = _told(instead) if instead else ""
+        return f"{closest}{left}: {speaks}, and no known effect says why{told}"
     names = found.chosen.name
     if word == "ambiguous":
         rivals = " or ".join(_instead(rival, found.chosen) for rival in found.rivals)
@@ -55,6 +60,14 @@ def _instead(rival: Fitted, chosen: Fitted) -> str:
     added = [name for name in rival.effects if name not in chosen.effects]
     missing = [name for name in chosen.effects if name not in rival.effects]
     return f"{' and '.join(added)} in place of {' and '.join(missing)}"
+
+
+def _another(found: MisstatedResult, left: float, noise: float) -> str:
+    return (
+        f"what explains it is no effect but another value in the data sheet: {found.name} ="
+        f" {found.wanted.value:.4g} for {found.stated:.4g}, with which {left:.3g} is left,"
+        f" {left / noise:.1f} times the noise"
+    )
 
 
 def _told(curve: CurveResult) -> str:

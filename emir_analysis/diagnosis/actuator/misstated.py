@@ -1,0 +1,44 @@
+"""Values of an actuator's data sheet that are not the machine's: whether one alone explains it.
+
+No effect of the registry: a gain, a frequency or a friction that the sheet states as exact, or
+whose range does not hold the machine's. Each is fitted with the parameters, far beyond its range.
+"""
+
+from dataclasses import replace
+
+from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
+from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.actuator.search import RANDOM_STARTS_ALONE, Misstated, each
+from emir_analysis.diagnosis.select import AT_NOISE
+from emir_common.parameter_tree import declared
+from emir_plant.actuator import ActuatorSheet
+
+FARTHEST = 10.0  # times the stated value, or less by as much
+GROUPS = ("valve", "load")
+
+
+def misstated(
+    sheet: ActuatorSheet, plain: Fitted, record: ActuatorRecord, noise: float
+) -> Misstated | None:
+    """Return the value that alone brings parameters to the noise, the most probable, if one does.
+
+    plain: the fit of the parameters inside their ranges. noise: of the pressure.
+    """
+    paths = [path for path in declared(sheet.machine) if path.partition(".")[0] in GROUPS]
+    known = [plain.machine, sheet.machine]
+
+    def fitted(path: str) -> Fitted:
+        other = _freed(sheet, path)
+        return fit(other, (), record, noise, known, drawn=RANDOM_STARTS_ALONE)
+
+    fits = [Misstated(*pair) for pair in zip(paths, each(paths, fitted), strict=True)]
+    enough = [found for found in fits if found.fitted.rms <= AT_NOISE * noise]
+    return max(enough, key=lambda found: found.fitted.evidence, default=None)
+
+
+def _freed(sheet: ActuatorSheet, path: str) -> ActuatorSheet:
+    """Return a sheet with one value free to be FARTHEST off, or anything if it is stated as 0."""
+    about, value = declared(sheet.machine)[path]
+    ends = [value / FARTHEST, value * FARTHEST] if value else [about.low, about.high]
+    low, high = (min(max(end, about.low), about.high) for end in sorted(ends))
+    return replace(sheet, ranges=sheet.ranges | {path: (low, high)})

@@ -16,6 +16,7 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import misstated
+from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limits, quiet
@@ -184,7 +185,12 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
     evidence: Evidence,
     progress: Progress,
 ) -> _Doubts:
-    """Ask whether a value of the sheet, a curve or a drift says better what a verdict says."""
+    """Ask whether a value of the sheet, a curve or a drift says better what a verdict says.
+
+    Or play is a spring.
+    """
+    if spring_in_series(named, evidence) is not None:
+        return _Doubts(any=True)
     replaced = _misstated(named, verdict, search, evidence, progress)
     if replaced:
         return _Doubts(any=True, misstated=tuple(replaced))

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, loudest_signal
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.moments import Moments, moments
+from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import EXPLAINED, at_noise
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
@@ -412,6 +413,14 @@ def _rejected(rejected: Trial, findings: Findings) -> str:
         loudness = dict(zip(BALANCES, level(residuals) / findings.floor, strict=True))
         off += f", but {loudness[speaking]:.1f} in the balance {speaking}"
     off = f" ({off})" if math.isfinite(left + plain) else ""
+    spring = spring_in_series(rejected, findings.evidence)
+    if spring is not None:
+        return (
+            f"{' and '.join(rejected.effects)} come{'s' if len(rejected.effects) == 1 else ''}"
+            f" closest{off}, but what yields does so in proportion to the force: a spring of"
+            f" {spring:.3g} N/m between piston and joint, such as a mount or a pin that bends, not"
+            " play; without it "
+        )
     them = "them" if len(rejected.effects) > 1 else "it"
     return f"{closest(rejected)}{off}; without {them} "
 

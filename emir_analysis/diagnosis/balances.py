@@ -65,6 +65,7 @@ READ, SMOOTHED = 0, 4  # columns of the angle among a recording's undistorted si
 SMOOTHING = 0.25  # s, of the angle from which velocity and lever arm are read: a quarter bend
 LAG_SMOOTHING = 0.05  # s, of pressures and deflection where a sensor's lag is undone
 EMPTY = 5.0  # times its noise: a lower pressure does not tell whether the chamber runs empty
+LOW = 3e5  # Pa, shown: a chamber that a transducer with a bias shows so may run empty
 QUIETER = 0.95  # share of the windows that a balance's level is taken from
 FLOW_WINDOW = 0.5  # s: the stroke's quantisation then weighs less than 1 % of the nominal flow
 FORCE_WINDOW = 1.0  # s: below the slow mode's period, above which a force would average out
@@ -122,6 +123,8 @@ class Balances:
         self._mean = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=0)
         low = shown[:, :2] < EMPTY * geometry.sensors.pressure_noise
         self._filled = [self._mean(column.astype(float)) == 0.0 for column in low.T]
+        self._low = [self._mean.least(column) < LOW for column in shown.T[:2]]
+        self._pressure_noise = geometry.sensors.pressure_noise
 
     @property
     def time(self) -> Array:
@@ -264,15 +267,27 @@ class Balances:
         lowering = lowering - modelled.pressure_lowering
         turning = angle - modelled.bending
         turning = turning - _integral(modelled.turning, period)
+        filled = [self._surely_filled(side, true[:, 1 + side]) for side in (0, 1)]
         return np.column_stack(
             [
                 self._turn(turning) * self._mean(self._force_per_turning),
-                self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]) * self._filled[0],
-                self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]) * self._filled[1],
+                self._flow(lifting) * self._mean(self._flow_per_rate[:, 0]) * filled[0],
+                self._flow(lowering) * self._mean(self._flow_per_rate[:, 1]) * filled[1],
                 self._mean(off),
                 self._mean(deflection - modelled.deflection),
             ]
         )
+
+    def _surely_filled(self, side: int, true: Array) -> Array:
+        """Return in which windows, (w,), a chamber is filled, by what is shown and what is true.
+
+        From one to none between two pressures, or a fit would have no slope over a bias.
+        """
+        filled, low = np.asarray(self._filled[side]), self._low[side]
+        if not np.any(low):
+            return filled
+        share = np.clip(self._mean.least(true) / self._pressure_noise - EMPTY + 1.0, 0.0, 1.0)
+        return np.asarray(np.where(low, share, 1.0) * filled)
 
 
 def level(residual: Array) -> Array:
@@ -320,10 +335,16 @@ class _Window:
         self._weights = np.linalg.pinv(powers)[degree] * factorial
 
     def __call__(self, signal: Array) -> Array:
-        count = signal.size - self._span + 1
-        views = sliding_window_view(signal[self._first :], self._size)[:count]
         with np.errstate(invalid="ignore", over="ignore"):  # of a machine that cannot be
-            return np.asarray(views[:: self._every] @ self._weights)
+            return np.asarray(self._views(signal) @ self._weights)
+
+    def least(self, signal: Array) -> Array:
+        """Return the least value in each window, (w,)."""
+        return np.asarray(self._views(signal).min(axis=1))
+
+    def _views(self, signal: Array) -> Array:
+        count = signal.size - self._span + 1
+        return sliding_window_view(signal[self._first :], self._size)[: count : self._every]
 
 
 def _integral(rate: Array, period: float) -> Array:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from emir_analysis.diagnosis.actuator.curves import measured
 from emir_analysis.diagnosis.actuator.misstated import misstated
+from emir_analysis.diagnosis.actuator.noise_size import as_left
 from emir_analysis.diagnosis.actuator.page import write_page
 from emir_analysis.diagnosis.actuator.record import (
     PRESSURE,
@@ -57,7 +58,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     progress(f"reading {bag}")
     record = open_record(bag, signal_map)
     _tell(record.left_out, progress)
-    found = _found(sheet, record, progress)
+    sheet, found = _found(sheet, record, progress)
     machines = stages(sheet, found)
     # frozen before the judge is opened
     as_found = replace(sheet, machine=machines["with_effect"])
@@ -79,17 +80,26 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     return result
 
 
-def _found(sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress) -> Search:
-    """Return the fits of all sets of effects, and what else there is where none explains all."""
+def _found(
+    sheet: ActuatorSheet, record: ActuatorRecord, progress: Progress
+) -> tuple[ActuatorSheet, Search]:
+    """Return the fits of all sets of effects, and what else there is where none explains all.
+
+    And the sheet, with the noise as measured where that is more than stated.
+    """
     noise = noise_floor(sheet, record)
     found = search(sheet, record, noise, progress)
+    if verdict(sheet, found, noise) == "unexplained":
+        sheet, line = as_left(sheet, found.chosen, record)
+        _tell(line, progress)
+        noise = noise_floor(sheet, record)
     if verdict(sheet, found, noise) == "unexplained":
         progress("other values in the data sheet")
         found = replace(found, misstated=misstated(sheet, found.plain, record, noise))
         if found.misstated is None:
             progress("measuring what has no name")
             found = replace(found, curve=measured(sheet, found, record, noise))
-    return found
+    return sheet, found
 
 
 def _judge(

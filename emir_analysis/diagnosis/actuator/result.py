@@ -165,6 +165,8 @@ def diagnosis(
     slow = _slow_period(found)
     chosen, fitted = found.chosen, _parameters(found.last)
     wanted = _misstated(sheet, found.misstated, fitted) if found.misstated else None
+    about = declared(sheet.machine)
+    own = {path: fitted[path] for path in sheet.ranges if path in fitted}
     word = verdict(sheet, found, noise)
     said = statement(word, found, noise, wanted or curve)
     if judge is not None and sheet.machine.sensor.pressure_noise:
@@ -183,7 +185,7 @@ def diagnosis(
         signals={PRESSURE: _signal(record.unit, noise, errors)},
         one_step={PRESSURE: _signal(record.unit, math.sqrt(2.0) * noise, ahead)},
         tests={PRESSURE: _tests(errors, ahead, judged, slow)},
-        parameters={path: p for path, p in fitted.items() if path in sheet.ranges},
+        parameters={k: replace(p, meaning=about[k][0].meaning) for k, p in own.items()},
         spread=float(np.std(judged.pressure)),
         not_told=NOT_TOLD,
         time_unit=sheet.time_unit,
@@ -262,7 +264,8 @@ def _tests(
     return ErrorTests(
         {n: rms_intervals([e[:, None]], [period], block)[0] for n, e in errors.items()},
         {n: input_correlation(e, opening, period, slow) for n, e in errors.items()},
-        {n: whiteness(e, period, slow) for n, e in ahead.items()},
+        # of every second step: the noise of one reading is in two neighbours
+        {n: whiteness(e[::2], 2.0 * period, slow) for n, e in ahead.items()},
     )
 
 

@@ -193,6 +193,69 @@ def test_a_law_that_no_effect_has_is_unexplained_and_measured(folder: Path) -> N
     assert (folder / "found.html").read_text().count("<img") == 2
 
 
+def test_another_value_in_the_sheet_is_told_where_that_is_what_is_wrong(folder: Path) -> None:
+    """The gain is beyond its range: no effect, though some come near."""
+    stated = "gain: {value: 1.0, range: [0.1, 10.0]}"
+    assert stated in recorded.SHEET
+    wrong = recorded.SHEET.replace(stated, "gain: {value: 1.0, range: [0.8, 1.2]}")
+    (folder / "sheet.yaml").write_text(wrong)
+    result = _diagnose(folder, *recorded.record(folder, _proportional))
+    assert result.verdict == "unexplained", summary(result)
+    told = result.misstated
+    assert told is not None
+    assert (told.name, told.stated) == ("valve.gain", 1.0)
+    assert told.wanted.value == pytest.approx(recorded.GAIN, rel=0.02)
+    assert "another value in the data sheet: valve.gain" in result.statement
+    signal = result.signals["oil_pressure"]
+    assert signal.with_effect < 1.2 * recorded.NOISE < 0.5 * signal.refitted
+    assert "another valve.gain" in summary(result)
+    machine = load_actuator(folder / "model.yaml").machine
+    assert machine.valve.gain == told.wanted.value
+
+
+@pytest.mark.parametrize("law", [_proportional, _limited])
+def test_a_pressure_noisier_than_stated_lacks_nothing_for_that(
+    folder: Path, law: recorded.Flow
+) -> None:
+    stated = f"value: {recorded.NOISE}}}"
+    assert stated in recorded.SHEET
+    (folder / "sheet.yaml").write_text(recorded.SHEET.replace(stated, "value: 0.005}"))
+    result = _diagnose(folder, *recorded.record(folder, law))
+    assert result.verdict == ("nothing_missing" if law is _proportional else "found")
+    assert result.signals["oil_pressure"].noise == pytest.approx(recorded.NOISE, rel=0.1)
+    machine = load_actuator(folder / "model.yaml").machine
+    assert machine.sensor.pressure_noise == pytest.approx(recorded.NOISE, rel=0.1)
+
+
+def test_a_large_leak_is_no_relief_valve(folder: Path) -> None:
+    """A relief valve that opens at no pressure would be the same."""
+
+    def leaking(spool: float, oil: float) -> float:
+        return recorded.GAIN * spool - 0.35 * oil
+
+    result = _diagnose(folder, *recorded.record(folder, leaking))
+    assert [e.name for e in result.effects] == ["internal_leakage"], summary(result)
+    leak = result.effects[0].parameters["conductance"]
+    assert leak.value == pytest.approx(0.35, rel=0.05)
+
+
+def test_a_simulation_without_noise_lacks_nothing(folder: Path) -> None:
+    """What two integrators differ by is nothing that a machine has."""
+    text = recorded.SHEET[: recorded.SHEET.index("sensor:")]
+    (folder / "sheet.yaml").write_text(text)
+    opening = recorded.moves(320, 1)
+    recorded.write(folder / "a", opening, recorded.pressure(opening, _proportional))
+    result = _diagnose(folder, folder / "a", None)
+    assert result.verdict == "nothing_missing", summary(result)
+
+
+def test_the_right_machine_leaves_white_errors(folder: Path) -> None:
+    """One sample ahead, though the noise of one reading is in two of them."""
+    (folder / "sheet.yaml").write_text(EXACT)
+    result = _diagnose(folder, *recorded.record(folder, _proportional))
+    assert result.tests["oil_pressure"].whiteness["with_effect"] < 1.0
+
+
 def test_what_the_judge_recording_alone_shows_is_told(folder: Path) -> None:
     (folder / "sheet.yaml").write_text(EXACT)
     bag, _ = recorded.record(folder, _proportional)

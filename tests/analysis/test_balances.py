@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 import recorded
+from operated import operated
 
 from emir_analysis.diagnosis.balances import BALANCES, Balances
 from emir_analysis.diagnosis.experiment import experiment
 from emir_analysis.signals import Recording, Signal
 from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine
-from emir_plant.sheet import load_sheet
+from emir_plant.sheet import joint1, load_sheet
 
 FRICTION = 12e3  # N
 
@@ -167,3 +168,18 @@ def test_a_sensor_that_is_known_to_distort_leaves_the_balances_quiet(
         assert quiet[name] < 1.5 * healthy[name], name
     assert loud["force"] > 5.0 * quiet["force"]
     assert loud["bending"] > 1.5 * quiet["bending"]
+
+
+def test_a_chamber_that_runs_empty_is_known_to_under_a_bias() -> None:
+    """An empty chamber has no rate of pressure; a transducer 1.5 bar too high shows it filled."""
+    machine = joint1()
+    biased = with_values(machine, {"effects.sensor_bias.pressure_lowering": 1.5e5})
+    commands = np.clip(1.6 * recorded.moves(16.0, seed=7), -1.0, 1.0)
+    runs = {each: operated(each, commands) for each in (machine, biased)}
+    empty = np.mean(runs[machine].outputs[:, 2] < 5.0 * machine.sensors.pressure_noise)
+    assert empty > 0.01
+    as_read, as_biased = (
+        rms(Balances(run, machine).residuals([each])[0])["lowering_chamber"]
+        for each, run in runs.items()
+    )
+    assert as_biased < 1.2 * as_read

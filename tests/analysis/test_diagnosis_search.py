@@ -380,6 +380,19 @@ def test_three_effects_are_found_together() -> None:
         assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
 
 
+def test_a_third_effect_is_found_beside_a_pair_that_alone_helps() -> None:
+    """The first effect leads nowhere near, and the pair does not suffice."""
+    hidden = {
+        "effects.payload.mass": 60.0,
+        "effects.valve_gain_asymmetry.lowering": -0.1,
+        "effects.internal_leakage.coefficient": 1.5e-12,
+    }
+    searched, _, evidence = search(hidden)
+    found = searched.whole.fitted(searched.run()[0])
+    assert set(found.effects) == {"payload", "valve_gain_asymmetry", "internal_leakage"}
+    assert at_noise(found, evidence)
+
+
 def test_of_a_short_recording_a_balance_may_hold_more() -> None:
     """Of 12 independent windows the mean square of noise is above 2.74 once in a thousand."""
 

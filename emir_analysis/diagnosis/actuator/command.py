@@ -5,7 +5,7 @@ from pathlib import Path
 
 from emir_analysis.diagnosis.actuator.curves import measured
 from emir_analysis.diagnosis.actuator.misstated import misstated
-from emir_analysis.diagnosis.actuator.noise_size import as_left
+from emir_analysis.diagnosis.actuator.noise_size import NOISE, as_left
 from emir_analysis.diagnosis.actuator.page import write_page
 from emir_analysis.diagnosis.actuator.record import (
     PRESSURE,
@@ -27,6 +27,7 @@ from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.import_command import write_signals
 from emir_analysis.outputs import check_outputs, write_all
 from emir_analysis.signals import Array, SignalMap, Source, read_signal_map
+from emir_common.parameter_tree import with_values
 from emir_plant.actuator import ActuatorSheet, load_actuator, write_actuator
 
 
@@ -61,7 +62,7 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
     sheet, found = _found(sheet, record, progress)
     machines = stages(sheet, found)
     # frozen before the judge is opened
-    as_found = replace(sheet, machine=machines["with_effect"])
+    as_found = _as_found(sheet, found)
     failed = write_all([(model_out, lambda file: write_actuator(file, as_found))])
     judged, useless = _judge(judge, signal_map, record, progress)
     failed += useless
@@ -100,6 +101,14 @@ def _found(
             progress("measuring what has no name")
             found = replace(found, curve=measured(sheet, found, record, noise))
     return sheet, found
+
+
+def _as_found(sheet: ActuatorSheet, found: Search) -> ActuatorSheet:
+    """Return the sheet of the machine that was found; a value that was misstated has no range."""
+    noise = {NOISE: sheet.machine.sensor.pressure_noise}  # as measured
+    wrong = () if found.misstated is None else (found.misstated.path,)
+    ranges = {path: ends for path, ends in sheet.ranges.items() if path not in wrong}
+    return replace(sheet, machine=with_values(found.last.machine, noise), ranges=ranges)
 
 
 def _judge(

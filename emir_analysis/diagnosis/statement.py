@@ -335,14 +335,22 @@ def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
     rejected = () if findings.rejected is None else findings.rejected.effects
     on = [name for name in rejected if getattr(effects, name).is_on]
     beside = f" beside {' and '.join(on)}" if on else ""
-    most = {CURVE_PARTS[name]: max(map(abs, points)) for name, points in curve.parts.items()}
-    unit = "" if curve.part_unit == "1" else f" {curve.part_unit}"
-    sizes = " and ".join(f"up to {size:.3g}{unit} {text}" for text, size in most.items())
+    sizes = " and ".join(_furthest(curve, name) for name in curve.parts)
     return (
         f"; measured as a curve{beside}, {curve.name} over {curve.over}, {sizes}, the free run of"
         f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
         f"{_beyond(curve, findings, judged)}"
     )
+
+
+def _furthest(curve: Curve, name: str) -> str:
+    """Return the point of a curve that is furthest from zero, with its sign.
+
+    A compliance less than the vessels have, say, is not that chamber's: another has more.
+    """
+    at, value = max(zip(curve.signal, curve.parts[name], strict=True), key=lambda p: abs(p[1]))
+    part_unit, unit = ("" if u == "1" else f" {u}" for u in (curve.part_unit, curve.unit))
+    return f"as far as {value:.3g}{part_unit} {CURVE_PARTS[name]} at {at:.3g}{unit}"
 
 
 def _beyond(curve: Curve, findings: Findings, judged: Judged) -> str:

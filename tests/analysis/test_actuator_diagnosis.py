@@ -249,6 +249,20 @@ def test_a_simulation_without_noise_lacks_nothing(folder: Path) -> None:
     assert result.verdict == "nothing_missing", summary(result)
 
 
+def test_a_recording_that_begins_in_the_middle_of_a_move_is_told(folder: Path) -> None:
+    opening = recorded.moves(600, 1)
+    oil = recorded.pressure(opening, _proportional)
+    oil += recorded.NOISE * np.random.default_rng(2).standard_normal(600)
+    shut = 30 + int(np.argmin(np.abs(opening[30:200])))  # the valve crosses zero, the mass swings
+    for name, begin in (("whole", 0), ("late", shut)):
+        recorded.write(folder / name, opening[begin:], oil[begin:])
+        record = open_record(folder / name, read_signal_map(folder / "signals.yaml"))
+        assert record.begins_moving(recorded.GAIN, recorded.NOISE) == (name == "late"), name
+    (folder / "sheet.yaml").write_text(EXACT)
+    result = _diagnose(folder, folder / "late", None)
+    assert "begins while the machine moves" in result.statement
+
+
 def test_the_right_machine_leaves_white_errors(folder: Path) -> None:
     """One sample ahead, though the noise of one reading is in two of them."""
     (folder / "sheet.yaml").write_text(EXACT)

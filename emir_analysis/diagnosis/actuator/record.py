@@ -15,6 +15,8 @@ FEWEST = 200  # samples: some periods of the slow mode, and blocks to leave out
 LARGEST_GAP = 1.5  # sampling periods
 AT_REST = 8  # samples from which on a machine may be seen to rest
 STEADY = 2.0  # times the noise: the most that a pressure at rest varies
+BEGINNING = 5  # samples, over which it shows whether a machine moves already
+SURELY = 8.0  # times the noise: a change that two readings at rest do not have
 SAME_PERIOD = 1e-3  # relative, within which two recordings are sampled alike
 NOT_OF_ORDER_ONE = 50.0  # times one, or less by as much: effects have other sizes then
 SMALLEST_MOTION = 1e-9  # spread of a signal, relative to its size, below which it is constant
@@ -52,6 +54,16 @@ class ActuatorRecord:
         if still.size >= AT_REST and np.std(still) <= STEADY * noise_of(still):
             return float(np.mean(still))
         return float(self.pressure[0])
+
+    def begins_moving(self, gain: float, noise: float) -> bool:
+        """Tell whether the machine moves already when the recording begins.
+
+        Over the first samples its pressure then changes by more than what the valve lets in and
+        the noise make. gain: of the valve. noise: of the pressure.
+        """
+        changed = np.abs(self.pressure[1:BEGINNING] - self.pressure[0])
+        let_in = abs(gain) * self.period * np.cumsum(np.abs(self.opening[:BEGINNING]))
+        return bool(np.any(changed > SURELY * noise + let_in[1:]))
 
     def follows(self, earlier: "ActuatorRecord") -> bool:
         """Return whether this recording goes on where another has ended."""

@@ -171,6 +171,7 @@ def diagnosis(
     said = statement(word, found, noise, wanted or curve)
     if judge is not None and sheet.machine.sensor.pressure_noise:
         word, said = _judged(word, said, judge.name, rms(errors["with_effect"]) / noise)
+    said += _not_from_rest(record, found, noise)
     return ActuatorDiagnosis(
         verdict=word,
         statement=said,
@@ -193,6 +194,15 @@ def diagnosis(
         judged_on=judged.name,
         judged_from_its_own_start=judge is None or not judge.follows(record),
         last=_last(found),
+    )
+
+
+def _not_from_rest(record: ActuatorRecord, found: Search, noise: float) -> str:
+    if not record.begins_moving(found.last.machine.valve.gain, noise):
+        return ""
+    return (
+        f"; but {record.name} begins while the machine moves, and what is simulated begins at rest:"
+        " an offset or a load may be for that alone, record from rest"
     )
 
 

@@ -9,10 +9,17 @@ See docs/actuator.md.
 from emir_plant.actuator.effects import REGISTRY
 from emir_plant.actuator.model import simulate
 from emir_plant.actuator.parameters import Actuator
-from emir_plant.actuator.sheet import ActuatorSheet, is_actuator, load_actuator, write_actuator
+from emir_plant.actuator.sheet import (
+    SAMPLE,
+    ActuatorSheet,
+    is_actuator,
+    load_actuator,
+    write_actuator,
+)
 
 __all__ = [
     "REGISTRY",
+    "SAMPLE",
     "Actuator",
     "ActuatorSheet",
     "is_actuator",

@@ -22,7 +22,8 @@ from emir_plant.actuator.effects import KNOWN
 from emir_plant.actuator.parameters import Actuator, Load, Valve
 
 MACHINE = "actuator"
-TIME_UNITS = ("sample", "s")
+SAMPLE = "sample"
+TIME_UNITS = (SAMPLE, "s")
 GROUPS = ("valve", "load", "sensor")
 HEADINGS = ("machine", "time_unit", "effects")
 _BLANK = Actuator(Valve(gain=1.0, time_constant=1.0), Load(frequency=1.0))
@@ -62,7 +63,7 @@ def load_actuator(path: Path) -> ActuatorSheet:
     try:
         return _sheet(content)
     except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from None
+        raise ParameterError(f"{path}: {error}{_unit_hint(content, str(error))}") from None
 
 
 def write_actuator(path: Path, sheet: ActuatorSheet) -> None:
@@ -86,6 +87,14 @@ def write_actuator(path: Path, sheet: ActuatorSheet) -> None:
         path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror}") from None
+
+
+def _unit_hint(content: dict[Any, Any], error: str) -> str:
+    """Return what to do about a value in seconds that is out of range: ranges suit samples."""
+    by_itself = "outside" in error and "outside its range" not in error
+    if not by_itself or content.get("time_unit", "s") != "s":
+        return ""
+    return "; the time of a fast machine is stated in samples (time_unit: sample)"
 
 
 def _sheet(content: dict[Any, Any]) -> ActuatorSheet:

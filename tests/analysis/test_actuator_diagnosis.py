@@ -263,6 +263,22 @@ def test_a_recording_that_begins_in_the_middle_of_a_move_is_told(folder: Path) -
     assert "begins while the machine moves" in result.statement
 
 
+def test_a_sheet_in_samples_is_right_for_any_rate(folder: Path) -> None:
+    """The same run with a sample every 3 s: nothing of the machine in samples is another."""
+    (folder / "sheet.yaml").write_text(EXACT)
+    bag, judge = recorded.record(folder, _proportional)
+    signals = read_signal_map(folder / "signals.yaml")
+    for name, begin in (("a", 0), ("b", 320)):
+        run = open_record(folder / name, signals)
+        recorded.write(folder / f"slow_{name}", run.opening, run.pressure, 3 * begin, seconds=3)
+    fast = _diagnose(folder, bag, judge)
+    slow = _diagnose(folder, folder / "slow_a", folder / "slow_b")
+    assert slow.verdict == fast.verdict == "nothing_missing"
+    assert not slow.judged_from_its_own_start
+    errors = (each.signals["oil_pressure"].refitted for each in (slow, fast))
+    assert next(errors) == pytest.approx(next(errors), rel=1e-6)
+
+
 def test_the_right_machine_leaves_white_errors(folder: Path) -> None:
     """One sample ahead, though the noise of one reading is in two of them."""
     (folder / "sheet.yaml").write_text(EXACT)

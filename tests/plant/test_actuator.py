@@ -248,6 +248,7 @@ def test_a_sheet_written_is_the_sheet_read(tmp_path: Path) -> None:
         ("valve: {gain: 1.0, time_constant: 1.0}", "load.frequency: missing"),
         ("valve: {gain: much, time_constant: 1.0}\nload: {frequency: 1.0}", "not a number"),
         ("valve: {gain: 1.0, time_constant: 0.0}\nload: {frequency: 1.0}", "outside"),
+        ("valve: {gain: 1.0, time_constant: 0.01}\nload: {frequency: 1.0}", "time_unit: sample"),
         ("valve: {volume: 1.0}", "valve.volume: there is no such parameter"),
         (f"{WHOLE}\nsensor: {{pressure_noise: {{value: 1, range: [0, 20]}}}}", "its range"),
         (f"{WHOLE}\nsensor: {{pressure_noise: {{value: 1, range: [2, 1]}}}}", "comes first"),

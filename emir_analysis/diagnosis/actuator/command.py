@@ -28,7 +28,7 @@ from emir_analysis.import_command import write_signals
 from emir_analysis.outputs import check_outputs, write_all
 from emir_analysis.signals import Array, SignalMap, Source, read_signal_map
 from emir_common.parameter_tree import with_values
-from emir_plant.actuator import ActuatorSheet, load_actuator, write_actuator
+from emir_plant.actuator import SAMPLE, ActuatorSheet, load_actuator, write_actuator
 
 
 def command(  # noqa: PLR0913 - the options of the command, one by one
@@ -57,14 +57,17 @@ def command(  # noqa: PLR0913 - the options of the command, one by one
         raise InputError(f"{judge}: no such recording")
     signal_map = read_signal_map(signals)
     progress(f"reading {bag}")
-    record = open_record(bag, signal_map)
-    _tell(record.left_out, progress)
+    opened = open_record(bag, signal_map)
+    _tell(opened.left_out, progress)
+    counted = opened.period if sheet.time_unit == SAMPLE else 1.0
+    record = opened.in_samples(counted)
     sheet, found = _found(sheet, record, progress)
     machines = stages(sheet, found)
     # frozen before the judge is opened
     as_found = _as_found(sheet, found)
     failed = write_all([(model_out, lambda file: write_actuator(file, as_found))])
-    judged, useless = _judge(judge, signal_map, record, progress)
+    judged, useless = _judge(judge, signal_map, opened, progress)
+    judged = judged and judged.in_samples(counted)
     failed += useless
     runs = judged_runs(machines, record, judged)
     shown = record if judged is None else judged

@@ -71,6 +71,10 @@ class ActuatorRecord:
         same = abs(self.period - earlier.period) < 1e-6 * self.period
         return same and abs(gap) < 0.5 * self.period
 
+    def in_samples(self, period: float) -> "ActuatorRecord":
+        """Return the recording with stamps that count samples, which came every period."""
+        return replace(self, begin=self.begin / period, period=self.period / period)
+
     def behind(self, earlier: "ActuatorRecord") -> "ActuatorRecord":
         """Return the earlier recording and this one as one."""
         return replace(

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import copy
 
 import actuator_recorded as recorded
 import numpy as np
@@ -268,11 +269,15 @@ def test_a_sheet_in_samples_is_right_for_any_rate(folder: Path) -> None:
     (folder / "sheet.yaml").write_text(EXACT)
     bag, judge = recorded.record(folder, _proportional)
     signals = read_signal_map(folder / "signals.yaml")
+    other = folder / "slow"
+    other.mkdir()
+    for file in ("sheet.yaml", "signals.yaml"):
+        copy(folder / file, other)
     for name, begin in (("a", 0), ("b", 320)):
         run = open_record(folder / name, signals)
-        recorded.write(folder / f"slow_{name}", run.opening, run.pressure, 3 * begin, seconds=3)
+        recorded.write(other / name, run.opening, run.pressure, 3 * begin, seconds=3)
     fast = _diagnose(folder, bag, judge)
-    slow = _diagnose(folder, folder / "slow_a", folder / "slow_b")
+    slow = _diagnose(other, other / "a", other / "b")
     assert slow.verdict == fast.verdict == "nothing_missing"
     assert not slow.judged_from_its_own_start
     errors = (each.signals["oil_pressure"].refitted for each in (slow, fast))

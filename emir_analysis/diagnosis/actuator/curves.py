@@ -6,7 +6,8 @@ import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
-from emir_analysis.diagnosis.actuator.search import MUCH, RANDOM_STARTS, Search, each, unseen_error
+from emir_analysis.diagnosis.actuator.search import MUCH, RANDOM_STARTS, Search, unseen_error
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.actuator import Actuator, ActuatorSheet
@@ -39,9 +40,9 @@ def measured(
     """
     sheets = [_with_places(sheet, n, v) for n, v in _visited(found.plain.machine, record).items()]
     known = [found.plain.machine]
-    fits = each(
-        zip(CURVES, sheets, strict=True),
+    fits = side_by_side(
         lambda named: fit(named[1], (named[0],), record, noise, known, drawn=RANDOM_STARTS),
+        zip(CURVES, sheets, strict=True),
     )
     best = max(range(len(fits)), key=lambda k: fits[k].evidence)
     unseen = unseen_error(sheets[best], fits[best].effects, record, noise)

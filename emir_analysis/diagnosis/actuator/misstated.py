@@ -8,8 +8,9 @@ from dataclasses import replace
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
-from emir_analysis.diagnosis.actuator.search import RANDOM_STARTS_ALONE, Misstated, each
+from emir_analysis.diagnosis.actuator.search import RANDOM_STARTS_ALONE, Misstated
 from emir_analysis.diagnosis.select import AT_NOISE
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_common.parameter_tree import declared
 from emir_plant.actuator import ActuatorSheet
 
@@ -31,7 +32,7 @@ def misstated(
         other = _freed(sheet, path)
         return fit(other, (), record, noise, known, drawn=RANDOM_STARTS_ALONE)
 
-    fits = [Misstated(*pair) for pair in zip(paths, each(paths, fitted), strict=True)]
+    fits = [Misstated(*pair) for pair in zip(paths, side_by_side(fitted, paths), strict=True)]
     enough = [found for found in fits if found.fitted.rms <= AT_NOISE * noise]
     return max(enough, key=lambda found: found.fitted.evidence, default=None)
 

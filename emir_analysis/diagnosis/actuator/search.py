@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error, sizes
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.diagnosis.select import AT_NOISE, STRONG
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.root_mean_square import rms
 from emir_plant.actuator import REGISTRY, ActuatorSheet
 
@@ -26,7 +25,6 @@ MUCH = 0.7  # of the error without effects, on parts left out: half of its squar
 BARE_MENTION = 0.5 * math.log(10.0)  # in the evidence: "barely worth mentioning" (Jeffreys 1961)
 
 Progress = Callable[[str], None]
-Thing = TypeVar("Thing")
 
 
 class Misstated(NamedTuple):
@@ -77,11 +75,11 @@ def search(
     progress("the best from each other's machines")
     good = _first(tried.values(), SETS_SETTLED)
     machines = [f.machine for f in good]
-    again = each(
-        good,
+    again = side_by_side(
         lambda f: fit(
             sheet, f.effects, record, noise, machines, drawn=RANDOM_STARTS, thorough=True
         ),
+        good,
     )
     tried |= {_key(f): f for f in again}
     _settle_below(sheet, record, noise, tried)
@@ -136,7 +134,7 @@ def _settle_below(
         before = _key(chosen)
         smaller = [tuple(e for e in chosen.effects if e != name) for name in chosen.effects]
         begun = partial(fit, sheet, record=record, noise=noise, known=[chosen.machine])
-        for fitted in each(smaller, begun):
+        for fitted in side_by_side(begun, smaller):
             known = tried.get(_key(fitted))
             if known is None or fitted.evidence > known.evidence:
                 tried[_key(fitted)] = fitted
@@ -214,15 +212,15 @@ def _neighbours(
     sets = [_key(parent) ^ {name} for name in REGISTRY]
     new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
-    first = each(
-        ordered,
+    first = side_by_side(
         lambda effects: fit(sheet, effects, record, noise, [parent.machine], levels=True),
+        ordered,
     )
     first = _first(first, len(first))
     better, others = first[: len(first) // 2], first[len(first) // 2 :]
-    again = each(
-        better,
+    again = side_by_side(
         lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=RANDOM_STARTS),
+        better,
     )
     return [*again, *others]
 
@@ -234,19 +232,13 @@ def unseen_error(
     number = np.arange(record.pressure.size) * PARTS_LEFT_OUT // record.pressure.size
     parts = [number == part for part in range(PARTS_LEFT_OUT)]
     known = [sheet.machine]
-    fits = each(
-        parts,
+    fits = side_by_side(
         lambda part: fit(
             sheet, effects, record, noise, known, seen=~part, drawn=RANDOM_STARTS_ALONE, levels=True
         ),
+        parts,
     )
     error = np.zeros(record.pressure.size)
     for part, fitted in zip(parts, fits, strict=True):
         error[part] = free_run_error(fitted.machine, record)[part]
     return rms(error)
-
-
-def each(things: Iterable[Thing], fitted: Callable[[Thing], Fitted]) -> list[Fitted]:
-    """Return the fit of each thing, fitted side by side on as many cores as numba may use."""
-    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
-        return list(threads.map(fitted, things))

@@ -189,7 +189,7 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
 
     Or play is a spring.
     """
-    if spring_in_series(named, evidence) is not None:
+    if verdict != "unexplained" and spring_in_series(named, evidence) is not None:
         return _Doubts(any=True)
     replaced = _misstated(named, verdict, search, evidence, progress)
     if replaced:

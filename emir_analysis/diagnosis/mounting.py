@@ -8,11 +8,12 @@ from emir_analysis.diagnosis.run_errors import free_run
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
-from emir_plant.effects.smooth_sign import smooth_sign
+from emir_plant.effects.backlash import flank
 from emir_plant.parameters import Machine
+from emir_plant.plant import Plant
 
 BACKLASH = "backlash"
-STRAIGHT = 0.1  # of what the mount yields, that is not in proportion to the force
+STRAIGHT = 0.1  # share of what the mount yields (RMS) that need not go with the force
 
 
 def spring_in_series(named: Trial, evidence: Evidence) -> float | None:
@@ -41,6 +42,5 @@ def _force(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arra
 
 def _offset(machine: Machine, force: Array) -> Array:
     """Return where the piston rests against the joint, (n,), m, under forces, (n,), N."""
-    play = machine.effects.backlash
-    seated = [smooth_sign(f / play.seating_force, play.gradual_share) for f in force]
-    return np.asarray(0.5 * play.gap * (np.array(seated) + force / play.pin_force))
+    p = Plant(machine).record[0]
+    return np.array([flank(f, p) for f in force])

@@ -34,12 +34,6 @@ from emir_plant.actuator.model import driven
 from emir_plant.actuator.unnamed import CURVES
 
 BOOTSTRAP_BLOCK = 2.0  # slow periods in a block of the bootstrap
-LABELS = {  # of the stages; what the last one has depends on what was found
-    "nominal": "data sheet",
-    "refitted": "re-fitted",
-    "with_effect": "",
-    "black_box": "best linear model",
-}
 NOT_TOLD = (
     "without the piston's position and velocity, forces cannot be told from flows by"
     " measurement: effects are told apart by the course of the pressure alone"
@@ -93,7 +87,12 @@ class ActuatorDiagnosis:
     @property
     def labels(self) -> dict[str, str]:
         """Return what the stages are called."""
-        return LABELS | {"with_effect": self.last}
+        return {
+            "nominal": "data sheet",
+            "refitted": "re-fitted",
+            "with_effect": self.last,
+            "black_box": "best linear model",
+        }
 
 
 def noise_floor(sheet: ActuatorSheet, record: ActuatorRecord) -> float:

@@ -6,7 +6,6 @@ own few fields remain to be fitted. Where those are fitted, the parameters stay 
 tolerances.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,8 @@ from scipy.optimize import lsq_linear
 
 from emir_analysis.diagnosis.fit import HELD, TOLERANCE_SPREAD, Problem, fit, steps_inside
 from emir_analysis.diagnosis.loads import LOAD, Load
+from emir_analysis.diagnosis.missing import Missing
+from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial, moved
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
@@ -29,8 +30,6 @@ SMALL = 0.1  # trial sizes, at which a machine is near enough to the known one
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 COST_DECIMALS = 6  # decimals of the cost, to which what leaves the same is told from rounding
 AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
-
-Missing = Callable[[list[Trial]], Array]  # (m, n), in units of the noise
 
 
 @dataclass(frozen=True)
@@ -59,11 +58,8 @@ class Left:
         low, high = (bound[free] for bound in known.unknowns.bounds)
         self._known, self._free = known.x, free
         self._bounds, self._room = (low, high), (low - x, high - x)
-        steps = steps_inside(x, step, high)
-        neighbours = known.x + steps[:, None] * np.eye(free.size)[free]
-        values = missing([known, *map(known.at, neighbours)])
-        slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None])
-        self._basis, self._triangle = np.linalg.qr(np.vstack([slopes.T, prior]))
+        slopes = Straight(known, missing, step, free).slopes
+        self._basis, self._triangle = np.linalg.qr(np.vstack([slopes, prior]))
         self.nothing = self.inside([known])[0][0]
 
     def __call__(self, trials: list[Trial]) -> Array:

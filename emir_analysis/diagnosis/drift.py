@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.straight import least
+from emir_analysis.diagnosis.missing import in_balances
+from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial
-from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
+from emir_analysis.diagnosis.unknowns import Unknown, unknowns
 from emir_analysis.signals import Array
-from emir_common.parameter_tree import with_values
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
@@ -47,13 +47,13 @@ def drift(balanced: Trial, evidence: Evidence, floor: Array) -> Drift | None:
     steady size says nearly as much.
     """
     balances = _Balances(balanced, evidence, floor)
-    plain = balances.left([])[1]
+    plain = balances.least([])[1]
     best: Drift | None = None
     for size in _sizes(balanced.unknowns.machine):
         slope = balances.slope(size)
-        _, steady = balances.left([(size, slope)])
+        _, steady = balances.least([(size, slope)])
         along, before = balances.along * slope, (1.0 - balances.along) * slope
-        ends, drifting = balances.left([(size, before), (size, along)])
+        ends, drifting = balances.least([(size, before), (size, along)])
         share = 1.0 - drifting / plain
         if share >= max(MADE, best.share if best else 0.0) and drifting <= STEADY * steady:
             begin, end = (size.value(float(x)) for x in ends)
@@ -76,31 +76,21 @@ class _Balances:
     """
 
     def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
-        self._known, self._evidence, self._floor = known, evidence, floor
-        steps = steps_inside(known.x, DIFFERENCE_STEP, known.unknowns.bounds[1])
-        moved = map(known.unknowns.at, known.x + np.diag(steps))
-        values = self._missing([known.machine, *moved])
-        self._left = values[0]
-        self._slopes = np.nan_to_num((values[1:] - values[0]) / steps[:, None]).T
-        time = evidence.time[: evidence.windows_of_first]
-        self.along = np.repeat((time - time[0]) / np.ptp(time), np.count_nonzero(evidence.fitted))
-
-    def _missing(self, machines: list[Machine]) -> Array:
-        left = self._evidence.residuals(machines)[:, : self._evidence.windows_of_first]
-        return self._evidence.in_noise(left, self._floor)
+        first = Evidence(evidence.experiments[:1], evidence.stated)
+        self._known, self._missing = known, in_balances(first, floor)
+        self._straight = Straight(known, self._missing, DIFFERENCE_STEP)
+        passed = (first.time - first.time[0]) / np.ptp(first.time)
+        self.along = np.repeat(passed, np.count_nonzero(first.fitted))
 
     def slope(self, size: Unknown) -> Array:
         """Return the slope, (n,), of what is missing by a size."""
-        moved = with_values(self._known.machine, {size.path: size.value(size.start)})
-        return np.asarray(np.nan_to_num(self._missing([moved])[0] - self._left) / size.start)
+        with_it = self._missing([self._known.also(size)])[0]
+        return np.asarray(np.nan_to_num(with_it - self._straight.left) / size.start)
 
-    def left(self, further: list[tuple[Unknown, Array]]) -> tuple[Array, float]:
+    def least(self, further: list[tuple[Unknown, Array]]) -> tuple[Array, float]:
         """Return the best of unknowns more, (j,), with their slopes, (n,) each.
 
         And the sum of squares that are then left above those of the noise.
         """
-        known, members = self._known, tuple(unknown for unknown, _ in further)
-        both = Unknowns(known.unknowns.machine, (*known.unknowns.members, *members))
-        slopes = np.column_stack([self._slopes, *(slope for _, slope in further)])
-        x, left = least(both, np.append(known.x, np.zeros(len(members))), self._left, slopes)
-        return x[known.x.size :], max(float(np.sum(left**2 - 1.0)), 1.0)
+        x, left = self._straight.least(further)
+        return x[self._known.x.size :], max(float(np.sum(left**2 - 1.0)), 1.0)

@@ -6,21 +6,17 @@ fitted is a nearly linear problem, and the whole recordings answer it. Its weak 
 of the friction is viscous, which a wrong shape makes up for: each shape also begins without.
 """
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import (
-    DIFFERENCE_STEP,
-    TOLERANCE_SPREAD,
-    mean_squares,
-    steps_inside,
-)
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, TOLERANCE_SPREAD, mean_squares
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.missing import in_balances
 from emir_analysis.diagnosis.run_errors import coarse_errors
+from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 
@@ -51,23 +47,25 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
 
     Each with viscous friction and, where that is heard, without.
     """
+    of_trials = in_balances(evidence, floor)
 
     def missing(points: Array) -> Array:
-        left = evidence.residuals([start.unknowns.at(x) for x in points])
-        return np.nan_to_num(evidence.in_noise(left, floor))
+        return np.nan_to_num(of_trials([start.at(x) for x in points]))
 
     paths = [unknown.path for unknown in start.unknowns.members]
     shaping = [paths.index(path) for path in SHAPES if path in paths]
     dry, viscous = paths.index(DRY), paths.index(VISCOUS)
-    others = [k for k in range(len(paths)) if k not in (*shaping, dry, viscous)]
+    others = np.array([k not in (*shaping, dry, viscous) for k in range(len(paths))])
     shapes, size = _grid(start), np.eye(start.x.size)
     points = np.tile(start.x, (len(shapes), 1))
     points[:, shaping] = shapes
     points[:, [dry, viscous]] = 0.0
     # without dry friction its shape makes no difference
     without, flowing = missing(points[0] + np.outer([0.0, 1.0], size[viscous]))
-    acting = np.vstack([_acting(start, others, missing), flowing - without])
-    free = np.array([*others, viscous, dry])
+    # of the others found once for all friction
+    acting = Straight(start, of_trials, DIFFERENCE_STEP, others).slopes.T
+    acting = np.vstack([acting, flowing - without])
+    free = np.append(np.flatnonzero(others), [viscous, dry])
     still = free != viscous
     found = []
     for point, sliding in zip(points, missing(points + size[dry]), strict=True):
@@ -76,14 +74,6 @@ def _by_balances(start: Trial, evidence: Evidence, floor: Array) -> Array:
         if viscous_is_heard(start.at(found[-1]), evidence, floor):
             found.append(_least(start, point, free[still], without, slopes[still]))
     return np.array(found)
-
-
-def _acting(start: Trial, others: list[int], missing: Callable[[Array], Array]) -> Array:
-    """Return how those unknowns act on what is missing, (o, n): found once for all friction."""
-    _, high = start.unknowns.bounds
-    steps = steps_inside(start.x, DIFFERENCE_STEP, high)
-    values = missing(np.vstack([start.x, start.x + np.diag(steps)[others]]))
-    return np.asarray((values[1:] - values[0]) / steps[others, None])
 
 
 def _grid(start: Trial) -> Array:

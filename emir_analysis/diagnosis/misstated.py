@@ -10,14 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidate import Missing, soft
+from emir_analysis.diagnosis.candidate import soft
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, steps_inside
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.fitting import FREE_RUN_STEP, fit_balances, fit_free_run, with_spread
-from emir_analysis.diagnosis.screening import in_balances, in_free_run
+from emir_analysis.diagnosis.missing import Missing, in_balances, in_free_run
 from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_score, leaves_quiet
-from emir_analysis.diagnosis.straight import least
+from emir_analysis.diagnosis.straight import Straight, least
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown
 from emir_analysis.signals import Array
@@ -79,19 +79,15 @@ def _promising(
 
     starts: with one unknown more than the known one or in place of one of its own.
     """
-    members = known.unknowns.members
-    steps = steps_inside(known.x, step, known.unknowns.bounds[1])
-    moved = [known.at(x) for x in known.x + np.diag(steps)]
-    last = [start.at(np.append(start.x[:-1], start.x[-1] + step)) for start in starts]
-    left = missing([known, *moved, *last])
-    slopes = np.nan_to_num((left[1:] - left[0]) / np.append(steps, [step] * len(starts))[:, None])
-    own, further = slopes[: len(members)], slopes[len(members) :]
-    limit = PROMISING * soft(least(known.unknowns, known.x, left[0], own.T)[1])
+    members, straight = known.unknowns.members, Straight(known, missing, step)
+    further = [start.at(np.append(start.x[:-1], start.x[-1] + step)) for start in starts]
+    slopes = np.nan_to_num((missing(further) - straight.left) / step)
+    limit = PROMISING * soft(straight.least()[1])
     costs = []
-    for start, slope in zip(starts, further, strict=True):
+    for start, slope in zip(starts, slopes, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
-        straight = np.vstack([own[kept], slope]).T
-        _, rest = least(start.unknowns, start.x, left[0], straight)
+        with_it = np.column_stack([straight.slopes[:, kept], slope])
+        _, rest = least(start.unknowns, start.x, straight.left, with_it)
         costs.append(soft(rest))
     best = [k for k in np.argsort(costs)[:MOST_FITTED] if costs[k] <= limit]
     return {starts[k].unknowns.members[-1].path: starts[k] for k in best}

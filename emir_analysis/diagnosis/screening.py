@@ -14,7 +14,6 @@ from emir_analysis.diagnosis.candidate import (
     SMALL,
     Candidate,
     Left,
-    Missing,
     Screened,
     best_change,
     load_fields,
@@ -24,7 +23,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.fitting import FREE_RUN_STEP
 from emir_analysis.diagnosis.loads import FOR_EVER, LOAD, Load, constant, likely, of_force, of_steps
-from emir_analysis.diagnosis.run_errors import coarse_errors, settled
+from emir_analysis.diagnosis.missing import in_balances, in_free_run
 from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
@@ -99,25 +98,6 @@ def screen_free_run(
     begun = _begun(known, sheet, loads, left, SMALL)
     stepped = side_by_side(lambda c: c.stepped(missing), begun)
     return sorted(stepped, key=lambda s: s.cost)
-
-
-def in_balances(evidence: Evidence, floor: Array) -> Missing:
-    """Return what trials leave in the balances, in units of a floor, (5,)."""
-
-    def missing(trials: list[Trial]) -> Array:
-        return evidence.in_noise(evidence.residuals([t.machine for t in trials]), floor)
-
-    return missing
-
-
-def in_free_run(known: Trial, evidence: Evidence) -> Missing:
-    """Return what trials leave in the coarse free run, from where a known one is at rest."""
-    rest = [settled(known.machine, e, evidence) for e in evidence.experiments]
-
-    def missing(trials: list[Trial]) -> Array:
-        return coarse_errors([t.machine for t in trials], evidence, rest)
-
-    return missing
 
 
 def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:

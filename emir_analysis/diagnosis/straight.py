@@ -1,11 +1,50 @@
-"""The best parameters where what is missing goes with them along straight lines."""
+"""What is missing beside a fitted trial, which goes with its parameters along straight lines."""
+
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from emir_analysis.diagnosis.fit import TOLERANCE_SPREAD
-from emir_analysis.diagnosis.unknowns import ROUNDING, Unknowns
+from emir_analysis.diagnosis.fit import TOLERANCE_SPREAD, steps_inside
+from emir_analysis.diagnosis.missing import Missing
+from emir_analysis.diagnosis.trial import Trial
+from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
 from emir_analysis.signals import Array
+
+
+class Straight:
+    """What a trial leaves, linear in its unknowns about it.
+
+    missing: trials -> (m, n), what they leave. step: of the slopes, in units of the unknowns. free:
+    (k,) which unknowns are moved, all by default. left: (n,) what the known trial leaves. slopes:
+    (n, f) by the free unknowns; 0 by one whose neighbour cannot be simulated.
+    """
+
+    def __init__(
+        self, known: Trial, missing: Missing, step: float, free: NDArray[np.bool_] | None = None
+    ) -> None:
+        self.known = known
+        steps = np.diag(steps_inside(known.x, step, known.unknowns.bounds[1]))
+        moves = steps if free is None else steps[free]
+        values = missing([known, *map(known.at, known.x + moves)])
+        self.left = values[0]
+        self.slopes = np.nan_to_num(((values[1:] - values[0]) / np.sum(moves, axis=1)[:, None]).T)
+
+    def least(
+        self, further: Sequence[tuple[Unknown, Array]] = (), expected: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return the unknowns, (k + j,), that leave least squares, and what is left, (n,).
+
+        All of the trial, and j further ones, begun at 0, each with its slope, (n,). expected: as
+        for the function of that name.
+        """
+        known = self.known
+        members = (*known.unknowns.members, *(unknown for unknown, _ in further))
+        both = Unknowns(known.unknowns.machine, members)
+        slopes = np.column_stack([self.slopes, *(slope for _, slope in further)])
+        begin = np.append(known.x, np.zeros(len(further)))
+        return least(both, begin, self.left, slopes, expected)
 
 
 def least(

@@ -15,8 +15,9 @@ import numpy as np
 from emir_analysis.diagnosis.balances import BALANCES, FORCE, FORCE_WINDOW, level
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, fit, steps_inside
+from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, fit
 from emir_analysis.diagnosis.fitting import GROWING, fit_balances, free_run_problem
+from emir_analysis.diagnosis.missing import in_balances
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY
 from emir_analysis.diagnosis.select import (
     EXPLAINED,
@@ -29,9 +30,10 @@ from emir_analysis.diagnosis.select import (
     quiet,
     score,
 )
-from emir_analysis.diagnosis.straight import least
+from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown, Unknowns
+from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import quantities
@@ -184,18 +186,14 @@ class _Balances:
 
     def __init__(self, known: Trial, evidence: Evidence, floor: Array) -> None:
         self._known, self._evidence, self._floor = known, evidence, floor
-        steps = steps_inside(known.x, DIFFERENCE_STEP, known.unknowns.bounds[1])
-        moved = map(known.unknowns.at, known.x + np.diag(steps))
-        left = evidence.residuals([known.machine, *moved])
-        self._rms = dict(zip(BALANCES, np.sqrt(np.mean(left[0] ** 2, axis=0)), strict=True))
-        missing = evidence.in_noise(left, floor)
-        self._missing = missing[0]
-        self._slopes = np.nan_to_num(((missing[1:] - missing[0]) / steps[:, None]).T)
+        self._straight = Straight(known, in_balances(evidence, floor), DIFFERENCE_STEP)
+        left = evidence.residuals([known.machine])[0]
+        self._rms = dict(zip(BALANCES, column_rms(left), strict=True))
         self._independent = evidence.duration(1.0) / FORCE_WINDOW
 
     def as_it_is(self) -> float:
         """Return the criterion of the known trial."""
-        return self._score(self._missing, self._known.x.size)
+        return self._score(self._straight.left, self._known.x.size)
 
     def with_force_in_motion(self) -> float:
         """Return the criterion with a force beside that is the same at any velocity but none."""
@@ -206,13 +204,10 @@ class _Balances:
         values = {f"{kind.group}.along.{k}": size * on for k, on in enumerate(moving)}
         machine = with_values(self._known.machine, self._named(kind) | values)
         pushed = self._evidence.in_noise(self._evidence.residuals([machine]), self._floor)[0]
-        slope = np.nan_to_num(pushed - self._missing)[:, None]
-        known = self._known
+        slope = np.nan_to_num(pushed - self._straight.left)
         force = Unknown(f"{kind.group}.along", "N", 0.0, size, -np.inf, np.inf, 0.0, False)
-        both = Unknowns(known.unknowns.machine, (*known.unknowns.members, force))
-        slopes = np.hstack([self._slopes, slope])
-        _, left = least(both, np.append(known.x, 0.0), self._missing, slopes)
-        return self._score(left, both.start.size)
+        x, left = self._straight.least([(force, slope)])
+        return self._score(left, x.size)
 
     def best(self, forms: Sequence[_Form]) -> _Begun | None:
         """Return the trial with the curves that the balances prefer, if there is any."""
@@ -262,7 +257,7 @@ class _Balances:
         alone = Unknowns(machine, points)
         moved = self._evidence.residuals([alone.at(x) for x in np.eye(len(points))])
         missing = self._evidence.in_noise(moved, self._floor)
-        return np.asarray(np.nan_to_num((missing - self._missing).T))
+        return np.asarray(np.nan_to_num((missing - self._straight.left).T))
 
     def _smoothest(self, form: _Form) -> _Begun:
         """Return the trial whose curves' second differences are small beside their size."""
@@ -271,11 +266,10 @@ class _Balances:
         bending = np.asarray(np.kron(np.eye(count), BENDING), dtype=np.float64)
         machine = with_values(known.machine, form.named)
         everything = Unknowns(machine, (*known.unknowns.members, *form.points))
-        begin = np.append(known.x, np.zeros(len(form.points)))
+        points = list(zip(form.points, form.slopes.T, strict=True))
         expected = np.hstack([np.zeros((len(bending), known.x.size)), bending])
-        slopes = np.hstack([self._slopes, form.slopes])
-        x, left = least(everything, begin, self._missing, slopes, expected)
-        share = 1.0 - _above_noise(left) / _above_noise(self._missing)
+        x, left = self._straight.least(points, expected)
+        share = 1.0 - _above_noise(left) / _above_noise(self._straight.left)
         criterion = self._criterion(left, form.slopes, bending)
         return _Begun(_with_smoothing(everything, x), criterion, share)
 

@@ -28,7 +28,7 @@ from emir_control.waypoints import Direct, Linkage
 from emir_msgs_py.topics import CONTROL_PERIOD
 from emir_plant.parameters import Machine
 from emir_plant.robot import linkage
-from emir_plant.robot.actuators import machines
+from emir_plant.robot.actuators import LOWERING, machines
 from emir_plant.robot.parameters import Robot
 from emir_plant.robot.reach import reach, record
 
@@ -152,7 +152,7 @@ def _force_loop(machine: Machine, low: float, high: float) -> DriveLoopParameter
         time_constant=HIGH_PASS,
         actuator=actuator(machine),
         limits=LimitParameters(
-            speed=1.1 * v.flow_nominal / c.area_lifting, stroke_low=low, stroke_high=high
+            speed=LOWERING * v.flow_nominal / c.area_lifting, stroke_low=low, stroke_high=high
         ),
     )
 

@@ -35,6 +35,7 @@ EACH = 5  # states of an actuator
 SIZE = 1 + ACTUATORS * EACH
 NO_LIMIT = 1e9  # Pa
 SUPPLY = 0  # index of the supply pressure
+LOWERING = 1.1  # times the speed of lifting, as the main joint's valve is sized (data/joint1.yaml)
 
 EFFECTS = (  # those without a memory of their own
     "coulomb_friction",
@@ -109,7 +110,7 @@ def _scaled(main: Machine, joint: Joint, reach: Reach) -> Machine:
         "cylinder.area_lowering": lowering,
         "cylinder.volume_lifting_0": drive.dead_volume_lifting - lifting * reach.stroke_low,
         "cylinder.volume_lowering_0": drive.dead_volume_lowering + lowering * reach.stroke_high,
-        "valve.flow_ratio_lowering": 1.1 * lowering / lifting,
+        "valve.flow_ratio_lowering": LOWERING * lowering / lifting,
         "valve.limit_lowering": NO_LIMIT,  # folded, the weight pulls the other way
     }
     return _valve_sized(main, drive.flow_nominal, values, joint.effects)

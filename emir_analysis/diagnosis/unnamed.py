@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.balances import BALANCES, FORCE, FORCE_WINDOW, leve
 from emir_analysis.diagnosis.curves import BY_VELOCITY, CHAMBERS, KINDS, Kind, ends, told_forms
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP, Problem, fit
-from emir_analysis.diagnosis.fitting import GROWING, fit_balances, free_run_problem
+from emir_analysis.diagnosis.fitting import GLIMPSE, GROWING, fit_balances, free_run_problem
 from emir_analysis.diagnosis.missing import in_balances
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY
 from emir_analysis.diagnosis.select import (
@@ -126,17 +126,19 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     """Return a trial fitted to the free run of the recordings, first of their beginning.
 
     That is left out where the balances' curve explains the whole. What the free run tells less
-    than they do stays as they say. A curve that does not come near even the beginning stays as
-    fitted to that.
+    than they do stays as they say. A curve that leaves more in a part than the whole may have left
+    stays as fitted to that, and one that is hopeless after a few steps is not polished.
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
     near = excess(start, evidence) <= beyond(EXPLAINED)
     for share in (1.0,) if near else (*GROWING, 1.0):
-        problem = free_run_problem(trial, evidence, x, share)
-        solution = fit(_smoothly(problem, trial, begin), FREE_RUN_ACCURACY)
+        problem = _smoothly(free_run_problem(trial, evidence, x, share), trial, begin)
+        solution = fit(problem, FREE_RUN_ACCURACY, evaluations=GLIMPSE)
+        if solution.misfit <= HOPELESS:
+            solution = fit(replace(problem, start=solution.x), FREE_RUN_ACCURACY)
         x, trial = solution.x, trial.continued(solution)
-        if solution.misfit > HOPELESS:
+        if share * (solution.misfit**2 - 1.0) > beyond(EXPLAINED):
             break
     return trial
 

@@ -27,7 +27,7 @@ from emir_analysis.diagnosis.result import (
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.statement import CURVE_PARTS
-from emir_analysis.diagnosis.summary import cautions, in_short, told_balances
+from emir_analysis.diagnosis.summary import cautions, in_short, nothing_added, told_balances
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html
 
@@ -59,7 +59,7 @@ def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged
         ),
         *_control(result),
     ]
-    write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
+    write_html(path, f"What does the model of {result.recording} lack?", blocks)
 
 
 def _effects(effects: tuple[EffectResult, ...]) -> list[Block]:
@@ -106,7 +106,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
         "black box",
     )
     return [
-        Heading(f"Free run on {Path(result.judged_on).name}"),
+        Heading(f"Free run on {result.judged_on}"),
         Table(
             columns,
             rows,
@@ -114,7 +114,7 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
             "RMS error over the whole recording, and the median over its blocks of 15 s, in units "
             "of the sensor noise (which is given in the signal's unit). Up to 1.1 is at the noise, "
             "up to 2 explained. The black box is a linear model of measured signals, trained on "
-            f"the same recordings.{_nothing_added(result)}",
+            f"the same recordings. {nothing_added(result)}",
         ),
         Picture(
             free_runs_picture(findings, judged),
@@ -122,12 +122,6 @@ def _free_runs(findings: Findings, result: Diagnosis, judged: Judged) -> list[Bl
             "Right: simulated minus measured, linear up to 5 times the noise.",
         ),
     ]
-
-
-def _nothing_added(result: Diagnosis) -> str:
-    if result.effects or result.misstated or result.curve is not None:
-        return ""
-    return " Nothing was added: the machine with effect is the re-fitted one."
 
 
 def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
@@ -143,7 +137,7 @@ def _balances(findings: Findings, result: Diagnosis) -> list[Block]:
                     (*SHOWN[name], b) for name, b in told_balances(result).items() if name in SHOWN
                 )
             ],
-            f"RMS over windows of half a second to a second of {Path(result.recording).name}; "
+            f"RMS over windows of half a second to a second of {result.recording}; "
             "noise is what the sensors alone would leave. Re-fitted here: to the balances; in the "
             "free runs: to those. H is the lifting chamber, S the lowering one.",
         ),

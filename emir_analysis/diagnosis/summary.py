@@ -1,7 +1,6 @@
 """The result of a diagnosis as lines for a terminal."""
 
 import math
-from pathlib import Path
 
 from emir_analysis.diagnosis.result import (
     BalanceResult,
@@ -43,11 +42,19 @@ def summary(result: Diagnosis) -> str:
     for name, s in result.signals.items():
         lines.append(f"{name:24}{s.noise:12.3g}" + _ratios(s) + f"  RMS, noise in {s.unit}")
         lines.append(f"{'':36}" + _ratios(result.block_medians[name]) + "  median of 15 s blocks")
+    lines += [added] if (added := nothing_added(result)) else []
     if result.control:
         lines += ["", "predictive control of the machine as found, designed before and after"]
     for name, c in result.control.items():
         lines.append(f"{name:24}stroke {1e3 * c.tracking:.1f} mm, TCP {1e2 * c.tcp:.1f} cm")
     return "\n".join(lines)
+
+
+def nothing_added(result: Diagnosis) -> str:
+    """Return that the machine with effect has none, where that is so."""
+    if result.effects or result.misstated or result.curve is not None:
+        return ""
+    return "Nothing was added: the machine with effect is the re-fitted one."
 
 
 def _sizes(effect: EffectResult) -> list[str]:
@@ -93,7 +100,7 @@ def in_short(result: Diagnosis) -> str:
     """Return what the errors come to, and what to do with what was found."""
     worst = {stage: _worst(result, stage) for stage in ("nominal", "refitted", "with_effect")}
     came, refitted, after = (f"{error:.3g}" for error in worst.values())
-    errors = f"Largest free-run error of a signal on {Path(result.judged_on).name}, times its noise"
+    errors = f"Largest free-run error of a signal on {result.judged_on}, times its noise"
     if result.effects:
         errors += f": {came} by the data sheet, {refitted} with its parameters fitted, {after} with"
         if worst["with_effect"] > EXPLAINED:

@@ -153,6 +153,7 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     page = (tmp_path / "a.html").read_text()
     assert page.count("<img") == 3
     assert "emir design --from designs for it" in page
+    assert "Nothing was added" not in page + summary(result)
 
 
 def test_an_effect_outside_the_registry_is_called_unexplained(
@@ -207,6 +208,9 @@ def test_what_the_judge_recording_alone_shows_is_not_called_nothing(
     assert f"{tmp_path / 'b'}, " in result.statement
     page = (tmp_path / "a.html").read_text()
     assert "no known effect explains" in page
+    assert f"What does the model of {tmp_path / 'a'} lack?" in page
+    assert "Nothing was added" in page
+    assert "Nothing was added" in summary(result)
 
 
 def test_a_sheet_without_tolerances_is_taken_at_its_word(folder: Path, tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def write_page(
         *_parameters(result),
         *tests_of_errors({PRESSURE: "oil pressure"}, result.signals, result.one_step, result.tests),
     ]
-    write_html(path, f"What does the model of {Path(result.recording).name} lack?", blocks)
+    write_html(path, f"What does the model of {result.recording} lack?", blocks)
 
 
 def _effects(result: ActuatorDiagnosis) -> list[Block]:
@@ -86,7 +86,7 @@ def _free_run(
     s = result.signals[PRESSURE]
     errors = {name: getattr(s, name) for name in result.labels}
     return [
-        Heading(f"Free run on {Path(result.judged_on).name}"),
+        Heading(f"Free run on {result.judged_on}"),
         Table(
             ("", "RMS error", "share of the spread"),
             [(result.labels[n], e, e / result.spread) for n, e in errors.items()],

@@ -31,6 +31,7 @@ BEYOND = 0.05  # share of the judge recordings
 HELPS = 0.9  # of what parameters alone leave: what leaves more does not come close
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
+FLAT = 0.2  # of its furthest point, the most that a curve varies that is one value all over
 DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
@@ -296,7 +297,8 @@ def _foreseen(findings: Findings, judged: Judged) -> str:
     if judged.evidence.name == findings.evidence.name or not off > EXPLAINED:
         return ""
     better = f", more than by the data sheet as it came ({stated:.1f})" if stated < off else ""
-    return f"; {judged.evidence.name} is {off:.1f} times the noise off{better}"
+    together = f"all signals of {judged.evidence.name} together"
+    return f"; {together} are {off:.1f} times the noise off{better}"
 
 
 def _further(findings: Findings, judged: Judged) -> str:
@@ -312,7 +314,7 @@ def _off(findings: Findings, judged: Judged) -> str:
     name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
     if off <= EXPLAINED:  # in one signal alone, then
         return f"where {name} is {alone:.1f} times its noise off"
-    return f"all in all {off:.1f} times the noise off, {name} {alone:.1f}"
+    return f"all signals together {off:.1f} times the noise off, {name} {alone:.1f}"
 
 
 def _elsewhere(findings: Findings, judged: Judged) -> str:
@@ -327,7 +329,7 @@ def _elsewhere(findings: Findings, judged: Judged) -> str:
         outside = float(np.mean((shown[:, k] < low) | (shown[:, k] > high)))
         if outside >= BEYOND:
             found.append(f"{name} for {100 * outside:.0f} % of it")
-    return f" (where nothing had been recorded: {', '.join(found)})" if found else ""
+    return f" (beyond what was learned from: {', '.join(found)})" if found else ""
 
 
 def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
@@ -344,12 +346,15 @@ def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
 
 
 def _furthest(curve: Curve, name: str) -> str:
-    """Return the point of a curve that is furthest from zero, with its sign.
+    """Return the point of a curve that is furthest from zero, with its sign; or that it is flat.
 
     A compliance less than the vessels have, say, is not that chamber's: another has more.
     """
     at, value = max(zip(curve.signal, curve.parts[name], strict=True), key=lambda p: abs(p[1]))
     part_unit, unit = ("" if u == "1" else f" {u}" for u in (curve.part_unit, curve.unit))
+    if np.ptp(curve.parts[name]) <= FLAT * abs(value):
+        middle = f"{np.mean(curve.parts[name]):.3g}{part_unit}"
+        return f"about {middle} {CURVE_PARTS[name]} all over, so that {curve.over} says nothing"
     return f"as far as {value:.3g}{part_unit} {CURVE_PARTS[name]} at {at:.3g}{unit}"
 
 

@@ -76,8 +76,8 @@ def cautions(result: Diagnosis) -> list[str]:
     lines = [result.tell_apart] if result.tell_apart else []
     if result.at_end:
         lines.append(
-            f"at the end of what is allowed: {_ends(result)}; a machine may be there, but where"
-            " this one cannot, something else is missing"
+            f"at the end of what is allowed: {_ends(result)}; if this machine cannot be there,"
+            " something else is missing"
         )
     if any(effect.name == DELAY for effect in result.effects):
         lines.append(

@@ -26,7 +26,8 @@ from emir_common.parameter_tree import declared
 STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block")  # groups
 LARGEST = math.log(10.0)  # of a value over the stated one, either way
 MOST_FITTED = 2  # of those that promise most on the balances, and on the free run ...
-PROMISING = 0.8  # of what parameters alone leave, to first order: those that leave more do not
+PROMISING = 0.8  # of what parameters alone leave above the noise, to first order, the most that is
+NOISE = 0.354  # mean of a soft square, sqrt(1 + z^2) - 1, of z that are noise
 
 
 def misstated(balanced: Trial, rival: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
@@ -82,7 +83,9 @@ def _promising(
     members, straight = known.unknowns.members, Straight(known, missing, step)
     further = [start.at(np.append(start.x[:-1], start.x[-1] + step)) for start in starts]
     slopes = np.nan_to_num((missing(further) - straight.left) / step)
-    limit = PROMISING * soft(straight.least()[1])
+    noise = NOISE * straight.left.size
+    above = soft(straight.least()[1]) - noise
+    limit = noise + PROMISING * above if above > 0.0 else 0.0  # or nothing is left to explain
     costs = []
     for start, slope in zip(starts, slopes, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]

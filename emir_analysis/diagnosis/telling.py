@@ -23,7 +23,7 @@ ONLY_HERE = {
     "lifting_chamber": "valve, leakage and air of the lifting side show in the motion alone",
     "lowering_chamber": "valve, leakage and air of the lowering side show in the motion alone",
     "linkage": "a stroke that does not fit the angle goes unseen",
-    "bending": "bending modes show in the free run alone, and a load is told from friction less well",
+    "bending": "bending shows in the free run alone, and a load is told from friction less well",
 }
 
 REACHES = np.geomspace(1e-2, 1e3, 16)  # in trial values

@@ -26,7 +26,7 @@ from emir_common.parameter_tree import declared
 STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block")  # groups
 LARGEST = math.log(10.0)  # of a value over the stated one, either way
 MOST_FITTED = 2  # of those that promise most on the balances, and on the free run ...
-PROMISING = 0.8  # of what parameters alone leave above the noise, to first order, the most that is
+PROMISING = 0.8  # of what parameters alone leave above the noise: the most, to first order
 NOISE = 0.354  # mean of a soft square, sqrt(1 + z^2) - 1, of z that are noise
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from emir_analysis.diagnosis.candidate import soft
+from emir_analysis.diagnosis.candidate import SOFT_NOISE, soft
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
@@ -27,7 +27,6 @@ STATED = ("geometry", "cylinder", "supply", "valve", "resistances", "logic_block
 LARGEST = math.log(10.0)  # of a value over the stated one, either way
 MOST_FITTED = 2  # of those that promise most on the balances, and on the free run ...
 PROMISING = 0.8  # of what parameters alone leave above the noise: the most, to first order
-NOISE = 0.354  # mean of a soft square, sqrt(1 + z^2) - 1, of z that are noise
 
 
 def misstated(balanced: Trial, rival: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
@@ -81,18 +80,19 @@ def _promising(
     starts: with one unknown more than the known one or in place of one of its own.
     """
     members, straight = known.unknowns.members, Straight(known, missing, step)
+    noise = SOFT_NOISE * straight.left.size
+    above = soft(straight.least()[1]) - noise
+    if above <= 0.0:
+        return {}  # nothing is left to explain
     further = [start.at(np.append(start.x[:-1], start.x[-1] + step)) for start in starts]
     slopes = np.nan_to_num((missing(further) - straight.left) / step)
-    noise = NOISE * straight.left.size
-    above = soft(straight.least()[1]) - noise
-    limit = noise + PROMISING * above if above > 0.0 else 0.0  # or nothing is left to explain
     costs = []
     for start, slope in zip(starts, slopes, strict=True):
         kept = [k for k, u in enumerate(members) if u in start.unknowns.members]
         with_it = np.column_stack([straight.slopes[:, kept], slope])
         _, rest = least(start.unknowns, start.x, straight.left, with_it)
         costs.append(soft(rest))
-    best = [k for k in np.argsort(costs)[:MOST_FITTED] if costs[k] <= limit]
+    best = [k for k in np.argsort(costs)[:MOST_FITTED] if costs[k] <= noise + PROMISING * above]
     return {starts[k].unknowns.members[-1].path: starts[k] for k in best}
 
 

@@ -24,12 +24,14 @@ class Straight:
     def __init__(
         self, known: Trial, missing: Missing, step: float, free: NDArray[np.bool_] | None = None
     ) -> None:
-        self.known = known
-        steps = np.diag(steps_inside(known.x, step, known.unknowns.bounds[1]))
-        moves = steps if free is None else steps[free]
+        self._known = known
+        steps = steps_inside(known.x, step, known.unknowns.bounds[1])
+        moves = np.diag(steps)
+        if free is not None:
+            steps, moves = steps[free], moves[free]
         values = missing([known, *map(known.at, known.x + moves)])
         self.left = values[0]
-        self.slopes = np.nan_to_num(((values[1:] - values[0]) / np.sum(moves, axis=1)[:, None]).T)
+        self.slopes = np.nan_to_num((values[1:] - values[0]).T / steps)
 
     def least(
         self, further: Sequence[tuple[Unknown, Array]] = (), expected: Array | None = None
@@ -39,7 +41,7 @@ class Straight:
         All of the trial, and j further ones, begun at 0, each with its slope, (n,). expected: as
         for the function of that name.
         """
-        known = self.known
+        known = self._known
         members = (*known.unknowns.members, *(unknown for unknown, _ in further))
         both = Unknowns(known.unknowns.machine, members)
         slopes = np.column_stack([self.slopes, *(slope for _, slope in further)])

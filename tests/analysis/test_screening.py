@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 from operated import moved
+from scipy.stats import norm
 
-from emir_analysis.diagnosis.candidate import Left
+from emir_analysis.diagnosis.candidate import SOFT_NOISE, Left, soft
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, fit
 from emir_analysis.diagnosis.fitting import fit_balances
@@ -20,6 +21,11 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet, joint1
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
+
+
+def test_noise_costs_what_the_normal_distribution_makes_it_cost() -> None:
+    weighed = norm.expect(lambda z: soft(np.array([z])))
+    assert pytest.approx(weighed, abs=1e-3) == SOFT_NOISE
 
 
 @pytest.mark.parametrize("effect", REGISTRY)

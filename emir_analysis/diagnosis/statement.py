@@ -31,7 +31,6 @@ BEYOND = 0.05  # share of the judge recordings
 HELPS = 0.9  # of what parameters alone leave: what leaves more does not come close
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
-FLAT = 0.2  # of its furthest point, the most that a curve varies that is one value all over
 DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
@@ -346,15 +345,12 @@ def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
 
 
 def _furthest(curve: Curve, name: str) -> str:
-    """Return the point of a curve that is furthest from zero, with its sign; or that it is flat.
+    """Return the point of a curve that is furthest from zero, with its sign.
 
     A compliance less than the vessels have, say, is not that chamber's: another has more.
     """
     at, value = max(zip(curve.signal, curve.parts[name], strict=True), key=lambda p: abs(p[1]))
     part_unit, unit = ("" if u == "1" else f" {u}" for u in (curve.part_unit, curve.unit))
-    if np.ptp(curve.parts[name]) <= FLAT * abs(value):
-        middle = f"{np.mean(curve.parts[name]):.3g}{part_unit}"
-        return f"about {middle} {CURVE_PARTS[name]} all over, so that {curve.over} says nothing"
     return f"as far as {value:.3g}{part_unit} {CURVE_PARTS[name]} at {at:.3g}{unit}"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from emir_analysis.diagnosis import statement
 from emir_analysis.diagnosis.curves import Curve
-from emir_analysis.diagnosis.statement import _beside, _beyond, _foreseen, _furthest, _rejected
+from emir_analysis.diagnosis.statement import _beside, _beyond, _foreseen, _rejected
 
 QUIET = {"force": 1.0, "lifting_chamber": 1.0, "lowering_chamber": 1.0, "bending": 1.0}
 
@@ -76,12 +76,3 @@ def test_parameters_that_do_worse_than_the_stated_ones_are_told() -> None:
     same = off(50.0, 41.0)
     same.evidence.name = "a"
     assert _foreseen(learned, same) == ""
-
-
-def test_a_curve_that_is_one_value_all_over_is_no_function_of_its_signal() -> None:
-    """As a constant force that the velocity happened to say best: it is no friction."""
-    flat = Curve("unnamed_force", "piston_velocity", "m/s", (-0.06, 0.0, 0.06), "N", {})
-    flat.parts["along"] = (380.0, 400.0, 438.0)
-    assert "about 406 N whatever the direction all over" in _furthest(flat, "along")
-    flat.parts["along"] = (-380.0, 0.0, 438.0)
-    assert _furthest(flat, "along") == "as far as 438 N whatever the direction at 0.06 m/s"

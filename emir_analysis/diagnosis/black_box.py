@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
+from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.root_mean_square import rms
 from emir_analysis.signals import Array
 
@@ -108,7 +108,7 @@ def _sampled(experiment: Experiment, model: BlackBox) -> tuple[Array, Array, Arr
         np.abs(experiment.commands) - model.dead_zone, 0.0
     )
     total = np.concatenate([[0.0], np.cumsum(beyond)])
-    steps = round(model.period / COMMAND_STEP)
+    steps = round(model.period / experiment.step)
     ends = np.minimum(np.arange(len(outputs) + 1) * steps, beyond.size)
     length = np.maximum(np.diff(ends), 1)
     return outputs, (np.diff(total[ends]) / length)[:, None], time

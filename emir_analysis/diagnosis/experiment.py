@@ -22,7 +22,7 @@ from emir_analysis.diagnosis.recording_checks import (
     check_values,
     stamps,
 )
-from emir_analysis.diagnosis.sampling import Sampling, sampling
+from emir_analysis.diagnosis.sampling import Sampling, grid_period, sampling, steps
 from emir_analysis.diagnosis.steady_stamps import steadied, steadied_told
 from emir_analysis.diagnosis.wild_readings import tamed
 from emir_analysis.errors import InputError
@@ -45,7 +45,7 @@ OUTPUTS = {  # what a free run is compared with, in this order, and its unit
 }
 SIGNALS = {COMMAND: "1", ANGLE: "rad"} | OUTPUTS
 
-COMMAND_STEP = 1e-3  # s, the grid on which the held command is kept
+COMMAND_STEP = 1e-3  # s, the grid on which the held command is kept, or near it
 SHARES = 2  # digits of the shares of such a step: stamps are rounded to microseconds
 SUBSTEP = 2e-3  # s, of coarse integration: a tenth of the spool's period and less
 SHORTEST = 10.0  # s: some periods of the slow mode, and a third to hold back
@@ -59,7 +59,7 @@ OWN_STROKE = 2.0  # times the resolver's error, by which a stroke that it does n
 class Experiment:
     """One recording on a common time grid, from rest.
 
-    period: s, between samples. commands: (k,) y2 every COMMAND_STEP. angle: (n,) rad.
+    period: s, between samples. commands: (k,) y2 every `step`. angle: (n,) rad.
     outputs: (n, 4) in the order of OUTPUTS, SI units, NaN where there is no sensor. rest: samples
     at rest at the start. measured: names of the signals that sensors show; of angle and stroke
     the one that none shows is computed from the other. own_stroke: the stroke is the piston's,
@@ -101,17 +101,22 @@ class Experiment:
     @property
     def every(self) -> int:
         """Steps of the command grid between two samples."""
-        return round(self.period / COMMAND_STEP)
+        return steps(self.period, COMMAND_STEP)
+
+    @property
+    def step(self) -> float:
+        """Of the command grid, s: COMMAND_STEP where sensors are read every whole such step."""
+        return self.period / self.every
 
     @property
     def every_row(self) -> int:
         """Steps of the command grid between two rows of a run from which the sensors read."""
-        return self.every // self.sampling.rows_between(self.every, COMMAND_STEP)
+        return self.every // self.sampling.rows_between(self.every, self.step)
 
     def stride(self, longest: float) -> int:
         """Return the most steps of the command grid, within `longest`, s, that divide a row."""
         fitting = (n for n in range(1, self.every_row + 1) if self.every_row % n == 0)
-        return max(n for n in fitting if n == 1 or n * COMMAND_STEP <= longest)
+        return max(n for n in fitting if n == 1 or n * self.step <= longest)
 
     def mean_commands(self, longest: float) -> tuple[Array, float]:
         """Return the mean command over each of equal steps, (m,), and their length, s.
@@ -120,9 +125,9 @@ class Experiment:
         """
         steps = math.ceil((self.period - ROUNDING) / longest)
         step = self.period / steps
-        integral = np.append(0.0, np.cumsum(self.commands)) * COMMAND_STEP
+        integral = np.append(0.0, np.cumsum(self.commands)) * self.step
         time = step * np.arange(self.commands.size // self.every * steps + 1)
-        reached = np.interp(time, COMMAND_STEP * np.arange(integral.size), integral)
+        reached = np.interp(time, self.step * np.arange(integral.size), integral)
         return np.diff(reached) / step, step
 
     def head(self, share: float) -> "Experiment":
@@ -215,9 +220,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     check_shared(name, list(sensors.values()))
     begin, end = _shared_span(name, list(sensors.values()))
     check_command(name, recording[COMMAND], begin, end, machine)
-    first = next(iter(sensors.values()))
-    every = max(1, round(float(np.median(np.diff(first.time))) / COMMAND_STEP))
-    period = every * COMMAND_STEP
+    period = grid_period(next(iter(sensors.values())).time, begin, COMMAND_STEP)
+    every = steps(period, COMMAND_STEP)
     # one microsecond of slack against stamps that were rounded
     time = begin + np.arange(int((end - begin + 1e-6) / period) + 1) * period
     shown = {n: np.interp(time, signal.time, signal.value) for n, signal in sensors.items()}
@@ -225,7 +229,8 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     command = as_given(name, recording[COMMAND], list(sensors.values()), period_stated)
     read = _sampling(sensors, time, begin)
     count = every * (time.size - 1)
-    given = _held(command, begin, count + every * read.further(time[-1] - begin, period))
+    further = every * read.further(time[-1] - begin, period)
+    given = _held(command, begin, count + further, period / every)
     commands, later = given[:count], given[count:]
     rest = _rest(name, commands, period, machine)
     measured = frozenset(shown)
@@ -318,7 +323,7 @@ def _strokes(angle: Array, machine: Machine) -> Array:
 def at_rest(experiment: Experiment, machine: Machine) -> int:
     """Return how many samples come before the first move."""
     moving = np.flatnonzero(np.abs(experiment.commands) > machine.valve.dead_zone)
-    return int(moving[0] * COMMAND_STEP / experiment.period)
+    return int(moving[0]) // experiment.every
 
 
 def noise(machine: Machine) -> Array:
@@ -340,17 +345,17 @@ def noise(machine: Machine) -> Array:
     )
 
 
-def _held(command: Signal, begin: float, count: int) -> Array:
-    """Return the command on its grid, each message held until the next; 0 before the first.
+def _held(command: Signal, begin: float, count: int, grid: float) -> Array:
+    """Return the command on a grid, s, each message held until the next; 0 before the first.
 
     In a step within which a message comes the mean, so that none acts earlier or later.
     """
-    edges = begin + np.arange(count + 1) * COMMAND_STEP
+    edges = begin + np.arange(count + 1) * grid
     latest = np.searchsorted(command.time, edges[:-1] + ROUNDING, side="right") - 1
     held = np.where(latest < 0, 0.0, command.value[np.maximum(latest, 0)])
     step = np.searchsorted(edges, command.time - ROUNDING) - 1
     within = (step >= 0) & (step < count)
-    left = 1.0 - (command.time - edges[step]) / COMMAND_STEP
+    left = 1.0 - (command.time - edges[step]) / grid
     change = np.round(left, SHARES) * np.diff(command.value, prepend=0.0)
     np.add.at(held, step[within], change[within])
     return np.asarray(np.clip(held, -1.0, 1.0))
@@ -362,7 +367,7 @@ def _rest(name: str, commands: Array, period: float, machine: Machine) -> int:
         raise InputError(
             f"{name}: the valve command never leaves the dead zone; record moves up and down"
         )
-    rest = moving[0] * COMMAND_STEP
+    rest = moving[0] * period / steps(period, COMMAND_STEP)
     if rest < SHORTEST_REST:
         raise InputError(f"{name}: starts moving at {rest:.2f} s; record a second at rest before")
     return max(1, int(min(rest, REST) / period))

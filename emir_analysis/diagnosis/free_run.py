@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from emir_analysis.diagnosis.experiment import COMMAND_STEP, SUBSTEP, Experiment
+from emir_analysis.diagnosis.experiment import SUBSTEP, Experiment
 from emir_analysis.root_mean_square import column_rms
 from emir_analysis.signals import Array
 from emir_plant import lanes
@@ -42,14 +42,14 @@ def free_runs(
     stride = experiment.stride(coarse_step(plants)) if coarse else 1
     given = np.concatenate([experiment.commands, experiment.later])
     commands = np.ascontiguousarray(given[::stride])  # or more is compiled
-    row = experiment.every_row * COMMAND_STEP
+    row = experiment.every_row * experiment.step
     truths = lanes.simulate_many(
         np.array([states[k] for k in able]),
         commands,
-        COMMAND_STEP * stride,
+        experiment.step * stride,
         experiment.every_row // stride,
         np.concatenate([plants[k].record for k in able], dtype=plants[0].record.dtype),
-        min(COMMAND_STEP * stride, stable_step(plants)),
+        min(experiment.step * stride, stable_step(plants)),
     )
     for k, truth in zip(able, truths, strict=True):
         shown = readings(plants[k], truth, row)

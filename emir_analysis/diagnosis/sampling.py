@@ -62,6 +62,29 @@ class Sampling:
         return [times for times in self.read_at if times is not None]
 
 
+def steps(period: float, step: float) -> int:
+    """Return how many steps, s or nearly that, make a period, s.
+
+    An even number where no number of whole ones does: a coarse run takes two at once.
+    """
+    whole = max(1, round(period / step))
+    is_whole = abs(period - whole * step) < ALMOST * period
+    return whole if is_whole else 2 * max(1, round(period / (2.0 * step)))
+
+
+def grid_period(times: Array, begin: float, step: float) -> float:
+    """Return the period, s, of a grid from a begin, s, for readings at times, (n,) s.
+
+    Whole steps, s, as far as readings stand there. Else their own, if they keep one: along lines
+    between readings of 80 Hz a fifth of the noise is lost on whole milliseconds.
+    """
+    usual, span = float(np.median(np.diff(times))), float(times[-1] - times[0])
+    whole = step * max(1, round(usual / step))
+    own = span / max(1, round(span / usual))
+    keeps = {each: _is_near(times, np.arange(begin, times[-1], each)) for each in (whole, own)}
+    return own if keeps[own] and not keeps[whole] else whole
+
+
 def sampling(read_at: Sequence[Array], time: Array) -> Sampling:
     """Return how signals were sampled that were read at times, each (r,) s, for a grid, (n,) s."""
     return Sampling(tuple(None if _is_near(times, time) else times for times in read_at))

@@ -91,8 +91,13 @@ def moves(duration: float, seed: int) -> Array:
     return command
 
 
-def simulate(machine: Machine, commands: Array, friction: Force | None = None) -> Array:
-    """Return p_H, p_S, angle and tip angle, (n, 4), every 10 ms, from rest at 45 deg.
+def simulate(
+    machine: Machine,
+    commands: Array,
+    friction: Force | None = None,
+    period: float = SAMPLE_PERIOD,
+) -> Array:
+    """Return p_H, p_S, angle and tip angle, (n, 4), every period, s, from rest at 45 deg.
 
     friction is added to the machine's own right-hand side.
     """
@@ -112,7 +117,7 @@ def simulate(machine: Machine, commands: Array, friction: Force | None = None) -
         return dx
 
     x = plant.initial(np.pi / 4.0, 25e5)
-    samples = np.arange(0.0, commands.size * COMMAND_PERIOD, SAMPLE_PERIOD)
+    samples = np.arange(0.0, commands.size * COMMAND_PERIOD, period)
     shown = []
     for k, command in enumerate(commands):
         begin, end = k * COMMAND_PERIOD, (k + 1) * COMMAND_PERIOD
@@ -133,10 +138,15 @@ def simulate(machine: Machine, commands: Array, friction: Force | None = None) -
     return np.column_stack([states[core.P_H], states[core.P_S], *angles])
 
 
-def measured(machine: Machine, truth: Array, seed: int) -> dict[str, tuple[Array, Array]]:
-    """Return time, s, and value of each sensor, as the sensors of the data sheet show the truth."""
+def measured(
+    machine: Machine, truth: Array, seed: int, period: float = SAMPLE_PERIOD
+) -> dict[str, tuple[Array, Array]]:
+    """Return time, s, and value of each sensor, as the sensors of the data sheet show the truth.
+
+    period: s, between two rows of it.
+    """
     noise = np.random.default_rng(seed).standard_normal((len(truth), 3))
-    time = np.arange(len(truth)) * SAMPLE_PERIOD
+    time = np.arange(len(truth)) * period
     angle = np.round(truth[:, 2] / STEP) * STEP
     p = Plant(machine).record[0]
     return {

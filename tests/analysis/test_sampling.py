@@ -48,17 +48,21 @@ def read(kept: dict[str, Array], late: float = 0.0) -> Experiment:
     late: standard deviation, s, of the normal distribution whose half the stamps' delays are.
     """
     random = np.random.default_rng(8)
-    commands, true = truth()
-    shown = recorded.measured(MACHINE, true, seed=1)
+    shown = recorded.measured(MACHINE, truth()[1], seed=1)
     signals = {}
     for name, topic in TOPICS.items():
         time, value = shown[topic]
         samples = kept.get(name, np.arange(time.size))
         delays = np.abs(random.normal(0.0, late, samples.size))
         signals[name] = Signal(name, np.sort(time[samples] + delays), value[samples], "")
+    return seen_by(signals)
+
+
+def seen_by(sensors: dict[str, Signal]) -> Experiment:
+    commands, _ = truth()
     time = np.arange(commands.size) * COMMAND_PERIOD
-    signals[COMMAND] = Signal(COMMAND, time, commands, "1")
-    return experiment("run", Recording(signals, 0), MACHINE)
+    command = Signal(COMMAND, time, commands, "1")
+    return experiment("run", Recording(sensors | {COMMAND: command}, 0), MACHINE)
 
 
 def off(seen: Experiment) -> Array:
@@ -97,6 +101,18 @@ def test_a_free_run_shows_its_own_machine_though_stamps_came_late() -> None:
     seen = read({}, late=4e-3)
     assert seen.mended
     assert np.max(column_rms(off(seen))) < 1.05
+
+
+@pytest.mark.parametrize("period", [1.0 / 80.0, 1.0 / 60.0, 1.0 / 30.0, 0.01002])
+def test_readings_of_any_steady_period_keep_all_of_their_noise(period: float) -> None:
+    """Along lines between two readings a part of it is lost; on a grid of their own none is."""
+    true = recorded.simulate(MACHINE, truth()[0], period=period)
+    shown = recorded.measured(MACHINE, true, seed=2, period=period)
+    seen = seen_by({name: Signal(name, *shown[topic], "") for name, topic in TOPICS.items()})
+    assert seen.period == pytest.approx(period, rel=1e-9)
+    error = column_rms(off(seen))
+    assert np.max(error) < 1.05
+    assert np.min(error[1:]) > 0.9  # the stroke's goes by the lever arm
 
 
 def test_else_the_lines_between_slow_readings_would_stand_as_errors() -> None:

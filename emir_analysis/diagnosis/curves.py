@@ -22,6 +22,14 @@ ACTS_IN = {  # balances, by list; the others act in both chambers
     "lifting": {"lifting_chamber"},
     "lowering": {"lowering_chamber"},
 }
+CURVE_PARTS = {  # the lists, in words
+    "along": "whatever the direction",
+    "friction": "against the motion",
+    "change": "of the opening as stated",
+    "lifting": "of the lifting chamber",
+    "lowering": "of the lowering chamber",
+    "across": "across the piston",
+}
 
 
 @dataclass(frozen=True)

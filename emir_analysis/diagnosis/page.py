@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from emir_analysis.diagnosis.balances import level
-from emir_analysis.diagnosis.curves import Curve
+from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.error_tests import ErrorTests
@@ -26,7 +26,6 @@ from emir_analysis.diagnosis.result import (
 )
 from emir_analysis.diagnosis.select import quiet
 from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
-from emir_analysis.diagnosis.statement import CURVE_PARTS
 from emir_analysis.diagnosis.summary import cautions, in_short, nothing_added, told_balances
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.report import Block, Heading, Picture, Table, Text, write_html

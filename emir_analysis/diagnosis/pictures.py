@@ -6,11 +6,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, StrMethodFormatter
 
 from emir_analysis.diagnosis.balances import BALANCES
-from emir_analysis.diagnosis.curves import Curve
+from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve
 from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.judged import Judged
-from emir_analysis.diagnosis.statement import CURVE_PARTS
 from emir_analysis.diagnosis.swing import Swing, by_swing
 from emir_analysis.report import new_figure
 

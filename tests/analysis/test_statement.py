@@ -7,7 +7,9 @@ import pytest
 
 from emir_analysis.diagnosis import statement
 from emir_analysis.diagnosis.curves import Curve
-from emir_analysis.diagnosis.statement import _beside, _beyond, _foreseen, _rejected
+from emir_analysis.diagnosis.judgement import _beyond, _foreseen
+from emir_analysis.diagnosis.remainder import _beside
+from emir_analysis.diagnosis.statement import _rejected
 
 QUIET = {"force": 1.0, "lifting_chamber": 1.0, "lowering_chamber": 1.0, "bending": 1.0}
 

@@ -1,0 +1,116 @@
+"""What the judge recordings say of a verdict, in words."""
+
+import math
+
+import numpy as np
+
+from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve, visited_by
+from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.experiment import OUTPUTS
+from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, loudest_signal
+from emir_analysis.diagnosis.loads import LOAD
+from emir_analysis.diagnosis.select import EXPLAINED
+
+BEYOND = 0.05  # share of the judge recordings
+PLACES = 3  # of the outputs: stroke and pressures, where a machine was
+
+
+def judgement(findings: Findings, judged: Judged) -> str:
+    """Return what the judge recordings say of a verdict, to follow it; empty where they agree."""
+    if findings.curve is not None:
+        return _measured(findings.curve, findings, judged)
+    if findings.misstated:
+        return f", that of {judged.evidence.name} {judged.off(STAGES[-1]):.2f}"
+    if findings.verdict == "unexplained":
+        return _foreseen(findings, judged) + _further(findings, judged)
+    if not judged.surprising:
+        return ""
+    off, judge = judged.off(STAGES[-1]), judged.evidence.name
+    worse = ""
+    if findings.chosen.effects and off > judged.off(REFITTED):
+        worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"
+    more = f"shows more{_elsewhere(findings, judged)}"
+    if judged.reconciled and findings.chosen.effects:
+        more += (
+            ", which the same effects and other parameters inside the tolerances explain as well"
+        )
+    elif judged.reconciled:
+        more += ", which other parameters inside the tolerances explain as well"
+    if LOAD in findings.chosen.effects:
+        more += "; a load from outside may have come at other times there"
+    return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: diagnose from that too"
+
+
+def _foreseen(findings: Findings, judged: Judged) -> str:
+    """Return how far off other recordings are, and that the data sheet as it came does better."""
+    off, stated = judged.off(REFITTED), judged.off(NOMINAL)
+    if judged.evidence.name == findings.evidence.name or not off > EXPLAINED:
+        return ""
+    better = f", more than by the data sheet as it came ({stated:.1f})" if stated < off else ""
+    together = f"all signals of {judged.evidence.name} together"
+    return f"; {together} are {off:.1f} times the noise off{better}"
+
+
+def _further(findings: Findings, judged: Judged) -> str:
+    elsewhere = _elsewhere(findings, judged)
+    return f"; {judged.evidence.name} goes further{elsewhere}" if elsewhere else ""
+
+
+def _off(findings: Findings, judged: Judged) -> str:
+    """Return how far off the judge recordings are, and in which signal most."""
+    off = judged.off(STAGES[-1])
+    if math.isnan(off):
+        return "where it cannot even rest"
+    name, alone = loudest_signal(findings.chosen.machine, judged.evidence)
+    if off <= EXPLAINED:  # in one signal alone, then
+        return f"where {name} is {alone:.1f} times its noise off"
+    return f"all signals together {off:.1f} times the noise off, {name} {alone:.1f}"
+
+
+def _elsewhere(findings: Findings, judged: Judged) -> str:
+    """Return at which strokes and pressures only the judge recordings were, if at many."""
+    known, shown = (
+        np.concatenate([e.outputs for e in evidence.experiments])
+        for evidence in (findings.evidence, judged.evidence)
+    )
+    found = []
+    for k, name in enumerate(list(OUTPUTS)[:PLACES]):
+        low, high = np.nanmin(known[:, k], initial=np.inf), np.nanmax(known[:, k], initial=-np.inf)
+        outside = float(np.mean((shown[:, k] < low) | (shown[:, k] > high)))
+        if outside >= BEYOND:
+            found.append(f"{name} for {100 * outside:.0f} % of it")
+    return f" (beyond what was learned from: {', '.join(found)})" if found else ""
+
+
+def _measured(curve: Curve, findings: Findings, judged: Judged) -> str:
+    effects = findings.chosen.machine.effects
+    rejected = () if findings.rejected is None else findings.rejected.effects
+    on = [name for name in rejected if getattr(effects, name).is_on]
+    beside = f" beside {' and '.join(on)}" if on else ""
+    sizes = " and ".join(_furthest(curve, name) for name in curve.parts)
+    return (
+        f"; measured as a curve{beside}, {curve.name} over {curve.over}, {sizes}, the free run of"
+        f" {judged.evidence.name} is {judged.off(STAGES[-1]):.2f} times the noise off"
+        f"{_beyond(curve, findings, judged)}"
+    )
+
+
+def _furthest(curve: Curve, name: str) -> str:
+    """Return the point of a curve that is furthest from zero, with its sign.
+
+    A compliance less than the vessels have, say, is not that chamber's: another has more.
+    """
+    at, value = max(zip(curve.signal, curve.parts[name], strict=True), key=lambda p: abs(p[1]))
+    part_unit, unit = ("" if u == "1" else f" {u}" for u in (curve.part_unit, curve.unit))
+    return f"as far as {value:.3g}{part_unit} {CURVE_PARTS[name]} at {at:.3g}{unit}"
+
+
+def _beyond(curve: Curve, findings: Findings, judged: Judged) -> str:
+    """Return that the judge recordings go where nothing was measured, if they do."""
+    parts = zip(
+        visited_by(curve, findings.evidence), visited_by(curve, judged.evidence), strict=True
+    )
+    outside = max(float(np.mean((s < np.nanmin(k)) | (s > np.nanmax(k)))) for k, s in parts)
+    if outside < BEYOND:
+        return ""
+    return f", of which {100 * outside:.0f} % lie beyond what it was measured at"

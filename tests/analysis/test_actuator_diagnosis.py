@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from emir_analysis.cli import main
 from emir_analysis.diagnosis.actuator import ActuatorDiagnosis, command, summary
-from emir_analysis.diagnosis.actuator.fitting import fit, narrowed
+from emir_analysis.diagnosis.actuator.fitting import Begin, Fitting, narrowed
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord, noise_of, open_record
 from emir_analysis.errors import IncompleteError
 from emir_analysis.import_command import import_csv
@@ -166,9 +166,9 @@ def test_a_threshold_far_from_where_a_fit_begins_is_found(folder: Path) -> None:
     bag, _ = recorded.record(folder, relieved)
     sheet = load_actuator(folder / "sheet.yaml")
     record = open_record(bag, read_signal_map(folder / "signals.yaml"))
-    plain = fit(sheet, (), record, recorded.NOISE, drawn=8)
-    known = [plain.machine]
-    found = fit(sheet, ("relief_valve",), record, recorded.NOISE, known, levels=True)
+    fitting = Fitting(sheet, record, recorded.NOISE)
+    plain = fitting.fit((), Begin(drawn=8))
+    found = fitting.fit(("relief_valve",), Begin([plain.machine], levels=True))
     assert found.rms < 1.1 * recorded.NOISE < 0.2 * plain.rms
     valve = found.machine.effects.relief_valve
     assert (valve.high, valve.low) == pytest.approx((0.4, 0.6), rel=0.02)
@@ -310,7 +310,7 @@ def test_a_parameter_stated_as_zero_is_fitted(folder: Path) -> None:
     bag, _ = recorded.record(folder, _proportional)
     sheet = load_actuator(folder / "sheet.yaml")
     record = open_record(bag, read_signal_map(folder / "signals.yaml"))
-    found = fit(sheet, (), record, recorded.NOISE).machine
+    found = Fitting(sheet, record, recorded.NOISE).fit((), Begin()).machine
     assert found.load.viscous_friction == pytest.approx(recorded.FRICTION, rel=0.05)
 
 
@@ -325,7 +325,7 @@ def _one_unknown(folder: Path) -> tuple[ActuatorSheet, ActuatorRecord]:
 def test_the_evidence_is_the_integral_over_what_is_expected(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     noise = recorded.NOISE
-    found = fit(sheet, (), record, noise)
+    found = Fitting(sheet, record, noise).fit((), Begin())
     assert found.rms > 3.0 * noise
     expected, deviation = np.log(1.0), np.log(10.0 / 0.1) / 4.0  # range 0.1 ... 10 around 1
     samples, lasting = record.pressure.size, 2.0 * np.pi / 0.25 / 4.0
@@ -357,7 +357,7 @@ def test_what_data_narrow_is_told_however_much_it_is() -> None:
 def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     own = actuator.simulate(sheet.machine, record.opening, record.period)
-    found = fit(sheet, (), replace(record, pressure=own), recorded.NOISE)
+    found = Fitting(sheet, replace(record, pressure=own), recorded.NOISE).fit((), Begin())
     assert found.rms == 0.0
     assert found.machine == sheet.machine
     assert np.isfinite(found.evidence)
@@ -366,10 +366,9 @@ def test_a_recording_of_the_model_itself_is_fitted_exactly(folder: Path) -> None
 def test_what_the_recording_says_nothing_about_stays_as_expected(folder: Path) -> None:
     sheet, record = _one_unknown(folder)
     record = replace(record, opening=0.2 * record.opening, pressure=0.2 * record.pressure)
-    without = fit(sheet, (), record, recorded.NOISE)
-    found = fit(
-        sheet, ("relief_valve",), record, recorded.NOISE
-    )  # opens at a pressure that is never reached
+    fitting = Fitting(sheet, record, recorded.NOISE)
+    without = fitting.fit((), Begin())
+    found = fitting.fit(("relief_valve",), Begin())  # opens at a pressure that is never reached
     valve = found.machine.effects.relief_valve
     assert (valve.high, valve.low) == pytest.approx((3.0, 3.0))
     expected = [unknown.deviation**2 for unknown in found.unknowns]
@@ -449,10 +448,11 @@ def test_the_crane_actuator_of_the_benchmark(shared: Path, tmp_path: Path) -> No
     assert is_actuator(own)
     sheet = load_actuator(own)
     noise = noise_of(record.pressure)
-    plain = fit(sheet, (), record, noise, drawn=8)
-    limited = fit(sheet, ("flow_limit", "turbulent_resistance"), record, noise, drawn=8)
+    fitting = Fitting(sheet, record, noise)
+    plain = fitting.fit((), Begin(drawn=8))
+    limited = fitting.fit(("flow_limit", "turbulent_resistance"), Begin(drawn=8))
     assert limited.rms < 0.7 * plain.rms < 0.7 * np.std(record.pressure)
     both = ("flow_limit", "turbulent_resistance", "elastic_boom", "swinging_load")
-    behind = fit(sheet, both, record, noise, [limited.machine], drawn=3)
+    behind = fitting.fit(both, Begin([limited.machine], drawn=3))
     assert behind.rms < 0.9 * limited.rms
     assert behind.evidence > limited.evidence > plain.evidence

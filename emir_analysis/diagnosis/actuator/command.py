@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from emir_analysis.diagnosis.actuator.curves import measured
+from emir_analysis.diagnosis.actuator.fitting import Fitting
 from emir_analysis.diagnosis.actuator.misstated import misstated
 from emir_analysis.diagnosis.actuator.noise_size import NOISE, as_left
 from emir_analysis.diagnosis.actuator.page import write_page
@@ -91,18 +92,18 @@ def _found(
 
     And the sheet, with the noise as measured where that is more than stated.
     """
-    noise = noise_floor(sheet, record)
-    found = search(sheet, record, noise, progress)
-    if verdict(sheet, found, noise) == "unexplained":
+    fitting = Fitting(sheet, record, noise_floor(sheet, record))
+    found = search(fitting, progress)
+    if verdict(sheet, found, fitting.noise) == "unexplained":
         sheet, line = as_left(sheet, found.chosen, record)
         _tell(line, progress)
-        noise = noise_floor(sheet, record)
-    if verdict(sheet, found, noise) == "unexplained":
+        fitting = Fitting(sheet, record, noise_floor(sheet, record))
+    if verdict(sheet, found, fitting.noise) == "unexplained":
         progress("other values in the data sheet")
-        found = replace(found, misstated=misstated(sheet, found.plain, record, noise))
+        found = replace(found, misstated=misstated(fitting, found.plain))
         if found.misstated is None:
             progress("measuring what has no name")
-            found = replace(found, curve=measured(sheet, found, record, noise))
+            found = replace(found, curve=measured(fitting, found))
     return sheet, found
 
 

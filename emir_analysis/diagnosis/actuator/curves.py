@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
+from emir_analysis.diagnosis.actuator.fitting import Begin, Fitted, Fitting
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
 from emir_analysis.diagnosis.actuator.search import MUCH, RANDOM_STARTS, Search, unseen_error
 from emir_analysis.diagnosis.side_by_side import side_by_side
@@ -30,24 +30,23 @@ class CurveResult:
     left: float
 
 
-def measured(
-    sheet: ActuatorSheet, found: Search, record: ActuatorRecord, noise: float
-) -> Fitted | None:
+def measured(fitting: Fitting, found: Search) -> Fitted | None:
     """Return the machine with the most probable curve, if that foretells parts left out.
 
     It has to leave less than MUCH of what parameters alone do there, and less than the effects
     that come closest.
     """
-    sheets = [_with_places(sheet, n, v) for n, v in _visited(found.plain.machine, record).items()]
-    known = [found.plain.machine]
-    fits = side_by_side(
-        lambda named: fit(named[1], (named[0],), record, noise, known, drawn=RANDOM_STARTS),
-        zip(CURVES, sheets, strict=True),
-    )
-    best = max(range(len(fits)), key=lambda k: fits[k].evidence)
-    unseen = unseen_error(sheets[best], fits[best].effects, record, noise)
+    visited = _visited(found.plain.machine, fitting.record)
+    fittings = {
+        name: replace(fitting, sheet=_with_places(fitting.sheet, name, signal))
+        for name, signal in visited.items()
+    }
+    begin = Begin([found.plain.machine], drawn=RANDOM_STARTS)
+    fits = side_by_side(lambda name: fittings[name].fit((name,), begin), CURVES)
+    best = max(fits, key=lambda fitted: fitted.evidence)
+    unseen = unseen_error(fittings[best.effects[0]], best.effects)
     plain, chosen = (found.unseen[f.name] for f in (found.plain, found.chosen))
-    return fits[best] if unseen < min(MUCH * plain, chosen) else None
+    return best if unseen < min(MUCH * plain, chosen) else None
 
 
 def as_result(curve: Fitted) -> CurveResult:

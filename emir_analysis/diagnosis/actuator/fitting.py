@@ -9,19 +9,25 @@ recording is under it (MacKay 1992, Neural Computation 4, 415).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.actuator.unknowns import (
+    ActuatorUnknown,
+    is_without,
+    place_of,
+    starts,
+    unknowns,
+    ways,
+)
 from emir_analysis.diagnosis.fit import steps_inside
 from emir_analysis.signals import Array
-from emir_common.parameter_tree import declared, with_values
-from emir_common.quantity import quantities
+from emir_common.parameter_tree import with_values
 from emir_plant.actuator import Actuator, ActuatorSheet, simulate
-from emir_plant.actuator.effects import KNOWN
 from emir_plant.actuator.model import column, run_each
 from emir_plant.actuator.model import record as flat_record
 
@@ -30,44 +36,13 @@ EVALUATIONS = 40  # of the model in one fit, beside those for the Jacobian
 SHORT = 5  # evaluations, after which the best of several fits are told
 ENDED = 2  # of them, which go on to the end
 ACCURACY = 1e-5  # relative, of cost and vector
-WIDE = 20.0  # a parameter whose range spans more than this factor is fitted as its logarithm
-RANGE_DEVIATIONS = 4.0  # standard deviations in the range of a data sheet's entry
-TYPICAL = 2.0  # deviation of an effect's parameter from its trial value, in trial values
-TYPICAL_FACTOR = 4.0  # the same where it is fitted as its logarithm
 INDEPENDENT = 4.0  # errors in a slow period that count as independent
 GUESSED = 0.1  # rms error before the first fit, in spreads of the pressure
 EXACT = 1e-4  # of the spread: an rms error below is none, integrators differ by as much
 ROUNDS = 2  # of fits with the rms error that the one before has left
 PLACES = 60  # drawn at random; the best of them are further starts
-LEVELS = (1.0, 0.125, 0.18, 0.25, 0.35, 0.5, 0.7, 1.4, 2.0)  # of trial values: where fits start
 
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One parameter: value = scale x, or scale exp(x) when logarithmic; low, high: bounds of x.
-
-    expected, deviation: of x, before anything is measured.
-    """
-
-    path: str
-    unit: str
-    scale: float
-    low: float
-    high: float
-    logarithmic: bool
-    expected: float
-    deviation: float
-
-    def value(self, x: float) -> float:
-        """Return the parameter's value."""
-        return self.scale * math.exp(x) if self.logarithmic else self.scale * x
-
-    def position(self, value: float) -> float:
-        """Return x at a value, inside the bounds."""
-        x = math.log(value / self.scale) if self.logarithmic else value / self.scale
-        return min(max(x, self.low), self.high)
 
 
 @dataclass(frozen=True)
@@ -79,7 +54,7 @@ class Fitted:
     """
 
     effects: tuple[str, ...]
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[ActuatorUnknown, ...]
     machine: Actuator
     x: Array
     covariance: Array
@@ -93,52 +68,6 @@ class Fitted:
         return " and ".join(self.effects) or "parameters only"
 
 
-def sizes(effects: Sequence[str]) -> list[str]:
-    """Return the sizes, by dotted path, of those effects that have several."""
-    several = [name for name in effects if len(KNOWN[name].sizes) > 1]
-    return [f"effects.{name}.{size}" for name in several for size in KNOWN[name].sizes]
-
-
-def unknowns(sheet: ActuatorSheet, effects: Sequence[str]) -> tuple[Unknown, ...]:
-    """Return what a data sheet leaves open and all parameters of the named effects."""
-    stated = declared(sheet.machine)
-    found = [
-        _stated(path, stated[path][0].unit, float(stated[path][1]), low, high)
-        for path, (low, high) in sheet.ranges.items()
-    ]
-    for effect in effects:
-        kind = KNOWN[effect]
-        for name, trial in kind.trial.items():
-            about = quantities(kind)[name]
-            low = kind.none_or_above.get(name, about.low)
-            for place in [f".{k}" for k in range(about.count)] or [""]:
-                path = f"effects.{effect}.{name}{place}"
-                found.append(_unknown(path, about.unit, trial, low, about.high))
-    return tuple(found)
-
-
-def _ways(members: tuple[Unknown, ...]) -> list[tuple[Unknown, ...]]:
-    """Return what is fitted, with and without what is either none or above some value."""
-    certain = tuple(member for member in members if not _may_be_none(member.path))
-    return [members] if len(certain) == len(members) else [certain, members]
-
-
-def _is_without(members: tuple[Unknown, ...], machine: Actuator) -> bool:
-    """Tell whether a machine has an effect, but none of what in it may be none."""
-    stated = flat_record(machine)
-    return any(
-        getattr(machine.effects, member.path.split(".")[1]).is_on
-        and column(stated, member.path)[0] == 0.0
-        for member in members
-        if _may_be_none(member.path)
-    )
-
-
-def _may_be_none(path: str) -> bool:
-    group, effect, *name = path.split(".")
-    return group == "effects" and name[0] in KNOWN[effect].none_or_above
-
-
 class _Surplus:
     """Errors, and what the parameters deviate from what is expected, in units of both.
 
@@ -148,7 +77,7 @@ class _Surplus:
     def __init__(
         self,
         sheet: ActuatorSheet,
-        members: tuple[Unknown, ...],
+        members: tuple[ActuatorUnknown, ...],
         record: ActuatorRecord,
         noise: float,
         seen: Mask | None,
@@ -240,49 +169,82 @@ class _Surplus:
         )  # fmt: skip
 
 
-def fit(  # noqa: PLR0913 - what is fitted, to what, from where, and how hard
-    sheet: ActuatorSheet,
-    effects: tuple[str, ...],
-    record: ActuatorRecord,
-    noise: float,
-    known: Sequence[Actuator] = (),
-    *,
-    seen: Mask | None = None,
-    drawn: int = 0,
-    levels: bool = False,
-    thorough: bool = False,
-    without: Sequence[str] = (),
-) -> Fitted:
-    """Return the most probable machine by the free run of the pressure, or the part `seen` (n,).
+@dataclass(frozen=True)
+class Begin:
+    """Where fits begin: at each known machine, at what is expected without any.
 
-    noise: of the pressure. Starts are each known machine, effects that it lacks at their trial
-    values, or with `levels` at all LEVELS of them; without any what is expected; and the best
-    `drawn` of places drawn from what is expected. The best ENDED after some steps are gone on from
-    to the end, `thorough` all.
-
-    What in an effect is none or above some value is fitted both ways. With it fits begin where the
-    effect is new or has it, `thorough` from every machine; places are drawn without it.
-    without: parameters, by dotted path, that stay as the sheet's machine has them.
+    Effects that a known machine lacks begin at their trial values, or with `levels` at all LEVELS
+    of them. drawn: how many places drawn from what is expected, the best of them, besides.
+    thorough: the fits go on to the end from all, not from the best ENDED after some steps alone.
     """
-    begun = []
-    members = tuple(m for m in unknowns(sheet, effects) if m.path not in without)
-    if not members:
-        return _as_stated(sheet, _Surplus(sheet, members, record, noise, seen))
-    ways = _ways(members)
-    for way in ways:
-        surplus = _Surplus(sheet, way, record, noise, seen)
-        starts = [] if known else [surplus.expected]
-        for machine in known:
-            if way is members and not thorough and _is_without(members, machine):
+
+    known: Sequence[Actuator] = ()
+    drawn: int = 0
+    levels: bool = False
+    thorough: bool = False
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """Fits to a recording of a machine with a data sheet; noise: of the pressure, in its unit."""
+
+    sheet: ActuatorSheet
+    record: ActuatorRecord
+    noise: float
+
+    def fit(
+        self,
+        effects: tuple[str, ...],
+        begin: Begin,
+        *,
+        seen: Mask | None = None,
+        without: Sequence[str] = (),
+    ) -> Fitted:
+        """Return the most probable machine by the free run of the pressure, or the part seen, (n,).
+
+        What in an effect is none or above some value is fitted both ways. With it fits begin where
+        the effect is new or has it, `thorough` from every machine; places are drawn without it.
+        without: parameters, by dotted path, that stay as the sheet's machine has them.
+        """
+        members = tuple(m for m in unknowns(self.sheet, effects) if m.path not in without)
+        if not members:
+            return _as_stated(self.sheet, self._surplus(members, seen))
+        begun = []
+        each_way = ways(members)
+        for way in each_way:
+            surplus = self._surplus(way, seen)
+            uncertain, drawn = way is members, way is each_way[0] or not begin.known
+            begun += [
+                (surplus, surplus.least(x, surplus.guessed, SHORT))
+                for x in self._starts(surplus, begin, uncertain=uncertain, drawn=drawn)
+            ]
+        begun.sort(key=lambda each: float(each[1].cost))
+        ended = begun if begin.thorough else begun[:ENDED]
+        fits = [_ended(self.sheet, effects, surplus, found.x) for surplus, found in ended]
+        return max(fits, key=lambda fitted: fitted.evidence)
+
+    def _surplus(self, members: tuple[ActuatorUnknown, ...], seen: Mask | None) -> _Surplus:
+        return _Surplus(self.sheet, members, self.record, self.noise, seen)
+
+    def _starts(
+        self, surplus: _Surplus, begin: Begin, *, uncertain: bool, drawn: bool
+    ) -> list[Array]:
+        """Return where fits of one way begin, (k,) each.
+
+        uncertain: it has what may be none. drawn: places are drawn for it.
+        """
+        members = surplus.members
+        found = [] if begin.known else [surplus.expected]
+        for machine in begin.known:
+            if uncertain and not begin.thorough and is_without(members, machine):
                 continue
-            starts += _starts(sheet, way, machine) if levels else [_place(way, machine)]
-        if drawn and (way is ways[0] or not known):
-            starts += surplus.drawn(surplus.guessed)[:drawn]
-        begun += [(surplus, surplus.least(x, surplus.guessed, SHORT)) for x in starts]
-    begun.sort(key=lambda each: float(each[1].cost))
-    ended = begun if thorough else begun[:ENDED]
-    fits = [_ended(sheet, effects, surplus, found.x) for surplus, found in ended]
-    return max(fits, key=lambda fitted: fitted.evidence)
+            if begin.levels:
+                found += starts(self.sheet, members, machine)
+            else:
+                found.append(place_of(members, machine))
+        if begin.drawn and drawn:
+            found += surplus.drawn(surplus.guessed)[: begin.drawn]
+        return found
 
 
 def _as_stated(sheet: ActuatorSheet, surplus: _Surplus) -> Fitted:
@@ -334,51 +296,3 @@ def free_run(machine: Actuator, record: ActuatorRecord) -> Array:
 def free_run_error(machine: Actuator, record: ActuatorRecord) -> Array:
     """Return simulated minus measured pressure, (n,)."""
     return free_run(machine, record) - record.pressure
-
-
-def _stated(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
-    """Return an entry of the data sheet with its range."""
-    found = _unknown(path, unit, value, low, high)
-    at = found.position(value)
-    return replace(found, expected=at, deviation=(found.high - found.low) / RANGE_DEVIATIONS)
-
-
-def _unknown(path: str, unit: str, value: float, low: float, high: float) -> Unknown:
-    """Return a parameter near a trial value; one of either sign is expected to be zero."""
-    if low * high > 0.0 and max(high / low, low / high) > WIDE:
-        least, most = sorted((math.log(low / value), math.log(high / value)))
-        width = math.log(TYPICAL_FACTOR)
-        return Unknown(path, unit, value, least, most, True, 0.0, width)
-    scale = abs(value) or max(abs(low), abs(high))
-    expected = 0.0 if low < 0.0 < high else value / scale
-    return Unknown(path, unit, scale, low / scale, high / scale, False, expected, TYPICAL)
-
-
-def _starts(sheet: ActuatorSheet, members: Sequence[Unknown], known: Actuator) -> list[Array]:
-    """Return places, (k,), with what a known machine lacks at all LEVELS of its trial values.
-
-    Beyond a threshold, or far from a mode, an effect changes nothing: no slope leads there. And
-    the machine may be what it is for want of the effect: also with the sheet's own parameters.
-    """
-    stated = declared(sheet.machine)
-    as_stated = with_values(known, {path: stated[path][1] for path in sheet.ranges})
-    bases = dict.fromkeys([known, as_stated])
-    return [_place(members, base, level) for base in bases for level in LEVELS]
-
-
-def _place(members: Sequence[Unknown], known: Actuator, level: float = 1.0) -> Array:
-    """Return a known machine's place, (k,), what it lacks at a level of its trial values."""
-    stated = flat_record(known)
-
-    def position(member: Unknown) -> float:
-        group, effect, *_ = member.path.split(".")
-        if group == "effects" and not getattr(known.effects, effect).is_on:
-            return member.position(level * _trial(member.path))
-        return member.position(float(column(stated, member.path)[0]))
-
-    return np.array([position(member) for member in members])
-
-
-def _trial(path: str) -> float:
-    _, effect, name, *_ = path.split(".")
-    return KNOWN[effect].trial[name]

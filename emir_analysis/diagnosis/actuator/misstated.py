@@ -6,8 +6,7 @@ whose range does not hold the machine's. Each is fitted with the parameters, far
 
 from dataclasses import replace
 
-from emir_analysis.diagnosis.actuator.fitting import Fitted, fit
-from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.actuator.fitting import Begin, Fitted, Fitting
 from emir_analysis.diagnosis.actuator.search import RANDOM_STARTS_ALONE, Misstated
 from emir_analysis.diagnosis.select import AT_NOISE
 from emir_analysis.diagnosis.side_by_side import side_by_side
@@ -18,22 +17,20 @@ FARTHEST = 10.0  # times the stated value, or less by as much
 GROUPS = ("valve", "load")
 
 
-def misstated(
-    sheet: ActuatorSheet, plain: Fitted, record: ActuatorRecord, noise: float
-) -> Misstated | None:
+def misstated(fitting: Fitting, plain: Fitted) -> Misstated | None:
     """Return the value that alone brings parameters to the noise, the most probable, if one does.
 
-    plain: the fit of the parameters inside their ranges. noise: of the pressure.
+    plain: the fit of the parameters inside their ranges.
     """
+    sheet = fitting.sheet
     paths = [path for path in declared(sheet.machine) if path.partition(".")[0] in GROUPS]
-    known = [plain.machine, sheet.machine]
+    begin = Begin([plain.machine, sheet.machine], drawn=RANDOM_STARTS_ALONE)
 
     def fitted(path: str) -> Fitted:
-        other = _freed(sheet, path)
-        return fit(other, (), record, noise, known, drawn=RANDOM_STARTS_ALONE)
+        return replace(fitting, sheet=_freed(sheet, path)).fit((), begin)
 
     fits = [Misstated(*pair) for pair in zip(paths, side_by_side(fitted, paths), strict=True)]
-    enough = [found for found in fits if found.fitted.rms <= AT_NOISE * noise]
+    enough = [found for found in fits if found.fitted.rms <= AT_NOISE * fitting.noise]
     return max(enough, key=lambda found: found.fitted.evidence, default=None)
 
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from emir_analysis.diagnosis.actuator.fitting import Fitted, fit, free_run_error, sizes
-from emir_analysis.diagnosis.actuator.record import ActuatorRecord
+from emir_analysis.diagnosis.actuator.fitting import Begin, Fitted, Fitting, free_run_error
+from emir_analysis.diagnosis.actuator.unknowns import sizes
 from emir_analysis.diagnosis.select import AT_NOISE, STRONG
 from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.root_mean_square import rms
-from emir_plant.actuator import REGISTRY, ActuatorSheet
+from emir_plant.actuator import REGISTRY
 
 PARTS_LEFT_OUT = 4  # each once: whole movements, not pieces between their like
 MOST_EFFECTS = 8
@@ -60,9 +60,7 @@ class Search:
         return self.curve or self.chosen
 
 
-def search(
-    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, progress: Progress
-) -> Search:
+def search(fitting: Fitting, progress: Progress) -> Search:
     """Add and drop single effects, from none on, while that leads to sets of more evidence.
 
     The sets with the most evidence are fitted once more from each other's machines. Of those as
@@ -70,19 +68,15 @@ def search(
     the noise of the pressure, one that is much more probable, or none.
     """
     progress("parameters only")
-    plain = fit(sheet, (), record, noise, drawn=RANDOM_STARTS_ALONE)
-    tried = _climbed(sheet, record, noise, plain, progress)
+    noise = fitting.noise
+    plain = fitting.fit((), Begin(drawn=RANDOM_STARTS_ALONE))
+    tried = _climbed(fitting, plain, progress)
     progress("the best from each other's machines")
     good = _first(tried.values(), SETS_SETTLED)
-    machines = [f.machine for f in good]
-    again = side_by_side(
-        lambda f: fit(
-            sheet, f.effects, record, noise, machines, drawn=RANDOM_STARTS, thorough=True
-        ),
-        good,
-    )
+    begin = Begin([f.machine for f in good], drawn=RANDOM_STARTS, thorough=True)
+    again = side_by_side(lambda f: fitting.fit(f.effects, begin), good)
     tried |= {_key(f): f for f in again}
-    _settle_below(sheet, record, noise, tried)
+    _settle_below(fitting, tried)
     ordered = _first(tried.values(), len(tried))
     plain = tried[frozenset()]
     chosen, rivals = _choice(ordered)
@@ -91,39 +85,32 @@ def search(
         rivals += [f for f in ordered if _key(f) not in known and _does_as_well(f, chosen)]
     if plain.rms <= AT_NOISE * noise and _better(chosen, plain) < STRONG:
         chosen, rivals = plain, []
-    chosen = _with_sizes_that_tell(sheet, record, noise, chosen)
+    chosen = _with_sizes_that_tell(fitting, chosen)
     shown = [plain, chosen, *rivals]
     progress("parts left out")
-    unseen = {f.name: unseen_error(sheet, f.effects, record, noise) for f in shown}
+    unseen = {f.name: unseen_error(fitting, f.effects) for f in shown}
     return Search(plain, chosen, tuple(ordered), tuple(rivals), unseen)
 
 
-def _climbed(
-    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, plain: Fitted, progress: Progress
-) -> dict[frozenset[str], Fitted]:
+def _climbed(fitting: Fitting, plain: Fitted, progress: Progress) -> dict[frozenset[str], Fitted]:
     """Return the sets tried from parameters only on, until the best ones' neighbours all are."""
     tried = {_key(plain): plain}
     left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
     best = plain
     while True:
-        breadth = 1 if best.rms <= AT_NOISE * noise else BREADTH
+        breadth = 1 if best.rms <= AT_NOISE * fitting.noise else BREADTH
         parents = [f for f in _first(tried.values(), breadth) if _key(f) not in left]
         if not parents:
             return tried
         for parent in parents:
             progress(f"beside: {parent.name}")
             left.add(_key(parent))
-            found = _neighbours(sheet, record, noise, parent, tried)
+            found = _neighbours(fitting, parent, tried)
             tried |= {_key(f): f for f in found}
         best = _first(tried.values(), 1)[0]
 
 
-def _settle_below(
-    sheet: ActuatorSheet,
-    record: ActuatorRecord,
-    noise: float,
-    tried: dict[frozenset[str], Fitted],
-) -> None:
+def _settle_below(fitting: Fitting, tried: dict[frozenset[str], Fitted]) -> None:
     """Fit the chosen set's own with one effect less once more from its machine, if that is better.
 
     On the way up one of them may have been left in a poor minimum, which an effect that is not
@@ -133,16 +120,14 @@ def _settle_below(
     while (chosen := _choice(_first(tried.values(), len(tried)))[0]) and _key(chosen) != before:
         before = _key(chosen)
         smaller = [tuple(e for e in chosen.effects if e != name) for name in chosen.effects]
-        begun = partial(fit, sheet, record=record, noise=noise, known=[chosen.machine])
+        begun = partial(fitting.fit, begin=Begin([chosen.machine]))
         for fitted in side_by_side(begun, smaller):
             known = tried.get(_key(fitted))
             if known is None or fitted.evidence > known.evidence:
                 tried[_key(fitted)] = fitted
 
 
-def _with_sizes_that_tell(
-    sheet: ActuatorSheet, record: ActuatorRecord, noise: float, chosen: Fitted
-) -> Fitted:
+def _with_sizes_that_tell(fitting: Fitting, chosen: Fitted) -> Fitted:
     """Return a set without those sizes of its effects without which it is as probable.
 
     A limit of the flow that the recording only just reaches is none that it tells.
@@ -150,7 +135,7 @@ def _with_sizes_that_tell(
     gone: list[str] = []
     for path in sizes(chosen.effects):
         without = [*gone, path]
-        fewer = fit(sheet, chosen.effects, record, noise, [chosen.machine], without=without)
+        fewer = fitting.fit(chosen.effects, Begin([chosen.machine]), without=without)
         _, effect, _ = path.split(".")
         stays_on = getattr(fewer.machine.effects, effect).is_on
         if stays_on and fewer.evidence > chosen.evidence - BARE_MENTION:
@@ -202,42 +187,29 @@ def _probable(fitted: Fitted) -> float:
 
 
 def _neighbours(
-    sheet: ActuatorSheet,
-    record: ActuatorRecord,
-    noise: float,
-    parent: Fitted,
-    tried: dict[frozenset[str], Fitted],
+    fitting: Fitting, parent: Fitted, tried: dict[frozenset[str], Fitted]
 ) -> list[Fitted]:
     """Fit the sets with one effect more or less; the better half again from further starts."""
     sets = [_key(parent) ^ {name} for name in REGISTRY]
     new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
-    first = side_by_side(
-        lambda effects: fit(sheet, effects, record, noise, [parent.machine], levels=True),
-        ordered,
-    )
+    begin = Begin([parent.machine], levels=True)
+    first = side_by_side(lambda effects: fitting.fit(effects, begin), ordered)
     first = _first(first, len(first))
     better, others = first[: len(first) // 2], first[len(first) // 2 :]
     again = side_by_side(
-        lambda f: fit(sheet, f.effects, record, noise, [f.machine], drawn=RANDOM_STARTS),
-        better,
+        lambda f: fitting.fit(f.effects, Begin([f.machine], drawn=RANDOM_STARTS)), better
     )
     return [*again, *others]
 
 
-def unseen_error(
-    sheet: ActuatorSheet, effects: tuple[str, ...], record: ActuatorRecord, noise: float
-) -> float:
+def unseen_error(fitting: Fitting, effects: tuple[str, ...]) -> float:
     """Return the RMS error of all parts, each by a fit that knows nothing of it."""
+    record = fitting.record
     number = np.arange(record.pressure.size) * PARTS_LEFT_OUT // record.pressure.size
     parts = [number == part for part in range(PARTS_LEFT_OUT)]
-    known = [sheet.machine]
-    fits = side_by_side(
-        lambda part: fit(
-            sheet, effects, record, noise, known, seen=~part, drawn=RANDOM_STARTS_ALONE, levels=True
-        ),
-        parts,
-    )
+    begin = Begin([fitting.sheet.machine], drawn=RANDOM_STARTS_ALONE, levels=True)
+    fits = side_by_side(lambda part: fitting.fit(effects, begin, seen=~part), parts)
     error = np.zeros(record.pressure.size)
     for part, fitted in zip(parts, fits, strict=True):
         error[part] = free_run_error(fitted.machine, record)[part]

@@ -17,7 +17,7 @@ import numpy as np
 from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.effect_shapes import shapes
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fit import Solution, fit
+from emir_analysis.diagnosis.fit import Solution
 from emir_analysis.diagnosis.friction_laws import (
     STRIBECK,
     VISCOUS,
@@ -34,6 +34,7 @@ from emir_analysis.diagnosis.run_errors import readings
 from emir_analysis.diagnosis.select import AT_NOISE, CORRELATION_TIME, STRONG, score
 from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.stick_slip import (
+    CLEARLY,
     DECIDED,
     DRAWN_OF_EACH,
     GROWTH,
@@ -56,7 +57,6 @@ SMOOTH = 3  # the same where friction comes along the way: they lead to one mini
 LED = (8, 4)  # of the best, along the next beginnings
 SAME_MINIMUM = 1.001  # ratio of the errors of two fits up to which they are the same minimum
 LEFT_EARLY = 1.08  # times the noise: as LEFT, over a beginning, where chance makes more
-CLEARLY = 1.02  # times: what a law has to leave less than one that is not at the noise
 SHARPER = 0.5  # times tanh's smoothing speed, where friction that comes gradually begins
 
 
@@ -125,7 +125,7 @@ def _begun(start: Trial, evidence: Evidence, floor: Array, rival: Sequence[float
         left.append(laws[0].misfit)
 
     def end(law: Law) -> Law:
-        return law._replace(fitted=led(law.start, evidence, law.fitted.x, time, DECIDED, fit))
+        return law._replace(fitted=led(law.start, evidence, law.fitted.x, time, DECIDED))
 
     ends = side_by_side(end, _as_good(laws, evidence.until(time)))
     return Begun(_as_good(ends, evidence.until(DECIDED))[0], left)

@@ -14,7 +14,7 @@ import numpy as np
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.fitting import free_run_problem
-from emir_analysis.diagnosis.friction_laws import is_along_the_way
+from emir_analysis.diagnosis.friction_laws import is_along_the_way, is_gradual
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY, weight_of_noise
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT
 from emir_analysis.diagnosis.trial import Trial
@@ -34,12 +34,14 @@ DRAWS_EARLY = 6  # and which is drawn on more often, each time in less time
 WIDER = 2.0  # times, every second time: over rough errors slopes promise too little spread
 DECIDED = 10.0  # s, of the beginning that chooses among laws
 OFF = 1.5  # times the noise over that, from which on more is missing: right laws leave 1.05 at most
+CLEARLY = 1.02  # times: what a law has to leave less than one that is not at the noise
 WORSE = 1.1  # times what a rival leaves over a beginning: none that leaves more can replace it
 STICKING_STEP = 3e-3  # as fit.DIFFERENCE_STEP: over longer ones the piston sticks at other instants
 ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest is gone is asked
 
 Method = Callable[[Problem, float], Solution]
 Limit = Callable[[Evidence], float]
+Law = tuple[tuple[str, ...], bool, bool]  # effects, gradual, along the way
 
 
 def _anything(_: Evidence) -> float:
@@ -51,34 +53,63 @@ class Grown(NamedTuple):
     """A trial fitted to a beginning that grew, and the RMS error that was left, in the noise.
 
     With the state at rest that was fitted along: where it sticks, a sixtieth of half a resolver
-    step may part two runs.
+    step may part two runs. given_up: the beginning is not the whole.
     """
 
     trial: Trial
     left: float
+    given_up: bool
+
+    @property
+    def left_of_whole(self) -> float:
+        """Return the RMS error over the whole, infinite where it was given up."""
+        return math.inf if self.given_up else self.left
 
 
-def grown(known: Trial, evidence: Evidence, rival: Trial | None = None) -> Grown:
-    """Fit a trial that was fitted to the first DECIDED to a beginning that grows to the whole.
+class Growths:
+    """Trials fitted to the first DECIDED, and led to the whole by a beginning that grows.
 
-    It is given up where it falls behind a rival that was fitted to more than that beginning.
+    A law that over the first DECIDED leaves as much as when it was led before would end there
+    again: it is led once.
     """
-    if rival is None:
-        return _grown(known, evidence, _anything)
-    return _grown(known, evidence, lambda part: WORSE * _misfit(rival, part))
 
+    def __init__(self, evidence: Evidence) -> None:
+        self._evidence = evidence
+        self._end = max(float(e.time[-1]) for e in evidence.experiments)
+        self._before: dict[Law, tuple[float, Grown]] = {}  # left over the first, and then
 
-def grown_at_noise(known: Trial, evidence: Evidence) -> Grown | None:
-    """Return the same if it is at the noise; given up where it clearly no longer is."""
-    found = _grown(known, evidence, lambda _: OFF)
-    return found if found.left <= AT_NOISE else None
+    def grown(self, known: Trial, rival: Trial | None = None) -> Grown:
+        """Return a trial fitted to the whole.
 
+        It is given up where it falls behind a rival that was fitted to more than that beginning.
+        """
+        if rival is None:
+            return self._grown(known, _anything)
+        return self._grown(known, lambda part: WORSE * _misfit(rival, part))
 
-def _grown(known: Trial, evidence: Evidence, limit: Limit) -> Grown:
-    end = max(float(e.time[-1]) for e in evidence.experiments)
-    x = from_rest(known, evidence)
-    fitted = led(known, evidence, x, DECIDED, end, descended, limit)
-    return Grown(known.continued(fitted), fitted.misfit)
+    def at_noise(self, known: Trial) -> Grown | None:
+        """Return the same if it is at the noise; given up where it clearly no longer is."""
+        found = self._grown(known, lambda _: AT_NOISE, again=False)
+        return found if found.left_of_whole <= AT_NOISE else None
+
+    def _grown(self, known: Trial, limit: Limit, *, again: bool = True) -> Grown:
+        """Return a trial led until it leaves more than a limit.
+
+        again: also where it was given up when it was led before.
+        """
+        x, part = from_rest(known, self._evidence), self._evidence.until(DECIDED)
+        first = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
+        law = known.effects, is_gradual(known), is_along_the_way(known)
+        if law in self._before:
+            before, ended = self._before[law]
+            if first.misfit * CLEARLY > before and not (ended.given_up and again):
+                return ended
+        if first.misfit > limit(part):
+            return Grown(known.continued(first), first.misfit, given_up=True)
+        fitted, time = led_on(known, self._evidence, first, DECIDED, self._end, descended, limit)
+        ended = Grown(known.continued(fitted), fitted.misfit, time < self._end)
+        self._before[law] = first.misfit, ended
+        return ended
 
 
 def from_rest(known: Trial, evidence: Evidence) -> Array:
@@ -86,16 +117,22 @@ def from_rest(known: Trial, evidence: Evidence) -> Array:
     return np.append(known.x, np.zeros(2 * len(evidence.experiments)))
 
 
-def led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
+def led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
+    """Fit to beginnings that grow from a time to another, s, from x, (k + 2 r,)."""
+    first = fitted_to(known, evidence.until(time), x, FREE_RUN_ACCURACY)
+    return led_on(known, evidence, first, time, end, fit)[0]
+
+
+def led_on(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     known: Trial,
     evidence: Evidence,
-    x: Array,
+    fitted: Solution,
     time: float,
     end: float,
     method: Method,
     limit: Limit = _anything,
-) -> Solution:
-    """Fit to beginnings that grow from a time to another, s.
+) -> tuple[Solution, float]:
+    """Fit to beginnings that grow from a fit to one, s, to another; return until when, s, too.
 
     Where the machine sticks at other instants than the free run, a fit mostly finds back to them.
     Where it does not, of machines drawn from what the beginning before leaves open one goes on
@@ -103,8 +140,7 @@ def led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     leaves more than before, the law is off, not one stick, and less is spent on it from there on.
     Given up where it leaves more over a beginning than the limit allows.
     """
-    smooth = is_along_the_way(known)
-    fitted, holds = fitted_to(known, evidence.until(time), x, FREE_RUN_ACCURACY, method), True
+    smooth, holds = is_along_the_way(known), True
     while time < end:
         holds = holds and fitted.misfit <= AT_NOISE
         growths = GROWTHS if holds else GROWTHS[:-1]
@@ -117,16 +153,17 @@ def led(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
             accuracy = FREE_RUN_ACCURACY if longer == end else ROUGH_ACCURACY
             fitted = fitted_to(known, part, fitted.x, accuracy, method, fitted.curvature)
         else:
-            draws = DRAWS_EARLY if longer <= EARLY else DRAWS
-            fitted = _found_again(known, part, fitted, method, draws if holds else 1)
+            accuracy = FREE_RUN_ACCURACY if holds or longer == end else ROUGH_ACCURACY
+            draws = (DRAWS_EARLY if longer <= EARLY else DRAWS) if holds else 1
+            fitted = _found_again(known, part, fitted, method, accuracy, draws)
             holds = holds and fitted.misfit <= AS_BEFORE * before
+        time = longer
         if not follows and fitted.misfit > limit(part):
             break
-        time = longer
-    return fitted
+    return fitted, time
 
 
-def followed(  # noqa: PLR0913, PLR0917 (as led)
+def followed(  # noqa: PLR0913, PLR0917 (as led_on)
     known: Trial,
     fitted: Solution,
     evidence: Evidence,
@@ -148,8 +185,13 @@ def _longer(time: float, end: float) -> float:
     return time if NEAR_END * time < end else end
 
 
-def _found_again(
-    known: Trial, evidence: Evidence, fitted: Solution, method: Method, draws: int
+def _found_again(  # noqa: PLR0913, PLR0917 (as led_on)
+    known: Trial,
+    evidence: Evidence,
+    fitted: Solution,
+    method: Method,
+    accuracy: float,
+    draws: int,
 ) -> Solution:
     """Return the best fit from where it was, or from the best of some draws of machines.
 
@@ -162,7 +204,7 @@ def _found_again(
             x = drawn(known, evidence, fitted, DRAWN if draws > 1 else DRAWN_OF_EACH, draw)
             if np.array_equal(x, fitted.x):
                 continue  # none of them is better than where it was
-        found.append(fitted_to(known, evidence, x, FREE_RUN_ACCURACY, method, fitted.curvature))
+        found.append(fitted_to(known, evidence, x, accuracy, method, fitted.curvature))
         left = sorted(each.misfit for each in found)
         if left[0] <= AS_BEFORE * fitted.misfit:
             break
@@ -197,7 +239,7 @@ def _errors(known: Trial, evidence: Evidence, points: Array) -> Array:
     return np.asarray(np.nan_to_num(np.sqrt(np.mean(np.square(left), axis=1)), nan=np.inf))
 
 
-def fitted_to(  # noqa: PLR0913, PLR0917 (as led)
+def fitted_to(  # noqa: PLR0913, PLR0917 (as led_on)
     known: Trial,
     evidence: Evidence,
     x: Array,

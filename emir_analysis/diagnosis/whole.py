@@ -30,7 +30,7 @@ from emir_analysis.diagnosis.select import (
     excess,
     free_run_score,
 )
-from emir_analysis.diagnosis.stick_slip import Grown, grown, grown_at_noise
+from emir_analysis.diagnosis.stick_slip import OFF, Grown, Growths
 from emir_analysis.diagnosis.trial import Trial, moved, with_all_terms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -50,6 +50,7 @@ class Whole:
         self._evidence, self._sheet = evidence, sheet
         self._floor, self._progress = floor, progress
         self._known: dict[tuple[str, ...], Trial] = {}
+        self._growths = Growths(evidence)
         self._with_fewest: set[frozenset[str]] = set()  # sizes that are all needed
 
     def fitted(self, chosen: Trial) -> Trial:
@@ -86,7 +87,7 @@ class Whole:
             return None
         if not follows_the_beginning(chosen, self._evidence):
             return None
-        led = grown(chosen, self._evidence)
+        led = self._growths.grown(chosen)
         return led.trial if led.left <= LEFT else None
 
     def _refined_again(self, fitted: Trial) -> Trial:
@@ -106,7 +107,7 @@ class Whole:
 
         Over all of a recording at once a fit ends close to where it began.
         """
-        return min(fitted, grown(fitted, self._evidence).trial, key=self.score)
+        return min(fitted, self._growths.grown(fitted).trial, key=self.score)
 
     def _with_fewer_sizes(self, full: Trial) -> Trial:
         """Return a trial with one size of its effects alone where that is better than with all.
@@ -224,25 +225,33 @@ class Whole:
         comes by tanh or gradually shows in many sticks only. Along the way that seals give only
         where none by the velocity is at the noise.
         """
-        found = self._grown(law, fuller, rival)
-        if AT_NOISE < found.left < HOPELESS and not is_along_the_way(law):
-            ways = [along_the_way(each) for each in (law, *fuller)]
-            rival = min(found.trial, rival, key=self.score)
-            found = min(found, self._grown(ways[0], ways[1:], rival), key=lambda f: f.left)
+        found, ways = self._growths.grown(law, rival), [along_the_way(f) for f in (law, *fuller)]
+        by_the_way = is_along_the_way(law)
+        if LEFT < found.left < HOPELESS and not is_gradual(law) and not by_the_way:
+            late = self._instead(found, gradually(law, self._evidence), rival)
+            if late is not found:
+                found, fuller = late, [gradual(more) for more in fuller]
+        found = self._fuller(found, fuller)
+        if AT_NOISE < found.left < HOPELESS and not by_the_way:
+            found = self._fuller(self._instead(found, ways[0], rival), ways[1:])
         return self._heard(found.trial)
 
-    def _grown(self, law: Trial, fuller: list[Trial], rival: Trial) -> Grown:
-        """Return the same by the velocity or along the way alone, as a law has it."""
-        found = grown(law, self._evidence, rival)
-        by_tanh = not is_gradual(law) and not is_along_the_way(law)
-        if LEFT < found.left < HOPELESS and by_tanh:
-            other = grown(gradually(law, self._evidence), self._evidence, rival)
-            if other.left < found.left:
-                found, fuller = other, [gradual(more) for more in fuller]
-        if found.left > AT_NOISE:
-            all_at_noise = (grown_at_noise(more, self._evidence) for more in fuller)
-            found = next((led for led in all_at_noise if led is not None), found)
-        return found
+    def _instead(self, found: Grown, law: Trial, rival: Trial) -> Grown:
+        """Return a law led to the whole where it leaves less than what was found.
+
+        Where that leaves little, it has to come to the noise: else it is off as well.
+        """
+        if found.left_of_whole <= OFF:
+            return self._growths.at_noise(law) or found
+        led = self._growths.grown(law, min(found.trial, rival, key=self.score))
+        return min(found, led, key=lambda each: each.left_of_whole)
+
+    def _fuller(self, found: Grown, fuller: list[Trial]) -> Grown:
+        """Return the first of fuller laws that is at the noise, where what was found is not."""
+        if found.left_of_whole <= AT_NOISE:
+            return found
+        all_at_noise = (self._growths.at_noise(more) for more in fuller)
+        return next((led for led in all_at_noise if led is not None), found)
 
     def _heard(self, led: Trial) -> Trial:
         """Return a trial without viscous friction that has become too small to be heard.

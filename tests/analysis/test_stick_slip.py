@@ -30,7 +30,7 @@ from emir_analysis.diagnosis.friction_laws import (
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import at_noise
-from emir_analysis.diagnosis.stick_slip import grown
+from emir_analysis.diagnosis.stick_slip import Growths
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -55,7 +55,7 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
     law = begun(fullest(known, sheet), evidence, searched.floor)
     assert with_less_friction(law, evidence, sheet, searched.floor) == [law]
-    found, left = grown(law, evidence)
+    found, left, _ = Growths(evidence).grown(law)
     assert left < 1.03
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -98,7 +98,7 @@ def test_seals_that_give_before_they_slide_are_found() -> None:
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     assert is_along_the_way(law)
     law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
-    fitted, left = grown(law, evidence)
+    fitted, left, _ = Growths(evidence).grown(law)
     assert left < 1.03
     assert fitted.effects == ("stribeck_friction",)
     stribeck = fitted.machine.effects.stribeck_friction
@@ -113,7 +113,7 @@ def test_no_more_friction_stays_than_there_is() -> None:
     searched, sheet, evidence = search(SLIDING)
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
-    fitted, _ = grown(law, evidence)
+    fitted = Growths(evidence).grown(law).trial
     assert fitted.effects == ("coulomb_friction",)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -275,7 +275,8 @@ def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.Monke
         return errors(known, part, points)
 
     monkeypatch.setattr(stick_slip, "_errors", watched)
-    _, left = grown(wrong, evidence, right)
+    _, left, given_up = Growths(evidence).grown(wrong, right)
+    assert given_up
     assert left > 1.1
     assert max(reached) < whole
 

@@ -249,7 +249,7 @@ def test_machines_are_drawn_where_a_fit_does_not_find_back(
 
     monkeypatch.setattr(stick_slip, "drawn", draw)
     monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: at(law, next(ends)))
-    found = stick_slip._found_again(law, evidence, at(law, 1.0), descended, 2)
+    found = stick_slip._found_again(law, evidence, at(law, 1.0), descended, 1e-3, 2)
     assert found.misfit == min(left)
     assert len(drawn) == draws
 

@@ -122,10 +122,16 @@ class Sensors:
     resolver_bits: int = quantity("1", 4, 24, "resolution of the joint resolver", default=12)
     resolver_span: float = quantity("rad", 0.1, 6.2832, "angle of the full count")
     pressure_noise: float = quantity("Pa", 0.0, 1e6, "standard deviation")
+    pressure_noise_lowering: float = quantity("Pa", 0.0, 1e6, "of p_S; 0: the same", default=0.0)
     deflection_noise: float = quantity("rad", 0.0, 1e-2, "standard deviation")
     own_stroke: int = quantity("1", 0, 1, "stroke: 0 by the angle, 1 measured", default=0)
     command_period: float = quantity("s", 0.0, 1.0, "of valve commands; 0: unknown", default=0.0)
     seed: int = quantity("1", 0, 2**31 - 1, "of the noise", default=0)
+
+    @property
+    def pressure_noises(self) -> tuple[float, float]:
+        """Standard deviations of p_H and p_S, Pa."""
+        return self.pressure_noise, self.pressure_noise_lowering or self.pressure_noise
 
     @property
     def resolver_step(self) -> float:

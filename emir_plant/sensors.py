@@ -87,8 +87,9 @@ def measure(plant: Plant, truth: Truth, sample: int, state: Array | None = None)
             true[name] = sensor_delay.shown(true[name], lagging, delay, late.dead_share)
     shown = {name: _distorted(value, name, machine) for name, value in true.items()}
     angle = resolver(shown["angle"], sensors.resolver_step)
-    lifting = shown["pressure_lifting"] + sensors.pressure_noise * noise[0]
-    lowering = shown["pressure_lowering"] + sensors.pressure_noise * noise[1]
+    noise_lifting, noise_lowering = sensors.pressure_noises
+    lifting = shown["pressure_lifting"] + noise_lifting * noise[0]
+    lowering = shown["pressure_lowering"] + noise_lowering * noise[1]
     return Measurement(
         angle=angle,
         stroke=shown["stroke"] if sensors.own_stroke else _stroke(angle, plant.record),

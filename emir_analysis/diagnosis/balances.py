@@ -121,10 +121,10 @@ class Balances:
         self._flow = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=1)
         self._turn = _Window(FORCE_WINDOW, FORCE_WINDOW, period, degree=2)
         self._mean = _Window(FLOW_WINDOW, FORCE_WINDOW, period, degree=0)
-        low = shown[:, :2] < EMPTY * geometry.sensors.pressure_noise
+        self._pressure_noises = geometry.sensors.pressure_noises
+        low = shown[:, :2] < EMPTY * np.array(self._pressure_noises)
         self._filled = [self._mean(column.astype(float)) == 0.0 for column in low.T]
         self._low = [self._mean.least(column) < LOW for column in shown.T[:2]]
-        self._pressure_noise = geometry.sensors.pressure_noise
 
     @property
     def time(self) -> Array:
@@ -284,9 +284,10 @@ class Balances:
         From one to none between two pressures, or a fit would have no slope over a bias.
         """
         filled, low = np.asarray(self._filled[side]), self._low[side]
+        noise = self._pressure_noises[side]
         if not np.any(low):
             return filled
-        share = np.clip(self._mean.least(true) / self._pressure_noise - EMPTY + 1.0, 0.0, 1.0)
+        share = np.clip(self._mean.least(true) / noise - EMPTY + 1.0, 0.0, 1.0)
         return np.asarray(np.where(low, share, 1.0) * filled)
 
 
@@ -398,7 +399,7 @@ def sensed(
     noise = np.random.default_rng(seed).standard_normal((len(angle), 3))
     if colour is not None:
         noise = coloured(noise, colour[1:])
-    scale = (sensors.pressure_noise, sensors.pressure_noise, sensors.deflection_noise)
+    scale = (*sensors.pressure_noises, sensors.deflection_noise)
     stroke = ideal[:, STROKE_COLUMN] if sensors.own_stroke else linkage.strokes(angle, p)
     shown = np.column_stack([stroke, ideal[:, 2:] + noise * scale])
     return experiment.showing(angle, shown)

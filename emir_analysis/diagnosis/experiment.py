@@ -338,8 +338,7 @@ def noise(machine: Machine) -> Array:
     return np.array(
         [
             arm * step / math.sqrt(12.0),
-            sensors.pressure_noise,
-            sensors.pressure_noise,
+            *sensors.pressure_noises,
             sensors.deflection_noise,
         ]
     )

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, at_rest
+from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment, at_rest, noise
 from emir_analysis.root_mean_square import rms
-from emir_common.parameter_tree import declared, with_values
+from emir_common.parameter_tree import with_values
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
@@ -19,30 +19,30 @@ DIFFERENCES = 3  # of which a machine that sways at rest has next to nothing
 WHITE = 20.0  # times the variance of white noise has its third difference
 MORE = 1.2  # times what is stated: less is left as it is
 SURE = 4.0  # standard deviations of the size found
-SENSORS = {  # parameter of the sheet -> the signals that have it
-    "sensors.pressure_noise": ("pressure_lifting", "pressure_lowering"),
-    "sensors.deflection_noise": ("tip_deflection_angle",),
+SENSORS = {  # and the parameter of each
+    "pressure_lifting": "sensors.pressure_noise",
+    "pressure_lowering": "sensors.pressure_noise_lowering",
+    "tip_deflection_angle": "sensors.deflection_noise",
 }
 
 
 def as_measured(sheet: Sheet, experiments: Sequence[Experiment]) -> tuple[Sheet, list[str]]:
     """Return the sheet with the noise that recordings show where that is more, and a line for each.
 
-    Where a parameter is that of several sensors, all have to be noisier.
+    Of each sensor by itself: one of two transducers may be worn.
     """
-    lines = []
-    for path, names in SENSORS.items():
-        about, stated = declared(sheet.machine)[path]
-        shown = [_size(experiments, sheet.machine, name) for name in names]
-        told = [(size, surely) for size, surely in shown if not np.isnan(size)]
-        if told and all(surely > MORE * stated > 0.0 for _, surely in told):
-            size = rms(np.array([size for size, _ in told]))
-            sheet = replace(sheet, machine=with_values(sheet.machine, {path: size}))
+    lines, values = [], {}
+    stated = dict(zip(OUTPUTS, noise(sheet.machine), strict=True))
+    for name, path in SENSORS.items():
+        values[path] = float(stated[name])
+        size, surely = _size(experiments, sheet.machine, name)
+        if surely > MORE * stated[name] > 0.0:
+            values[path] = size
             lines.append(
-                f"{', '.join(names)}: scatter at rest by {size:.2g} {about.unit}, where the data"
-                f" sheet's {path} is {stated:.2g}: taken as measured"
+                f"{name} scatters at rest by {size:.2g} {OUTPUTS[name]}, where the data sheet has"
+                f" {stated[name]:.2g}: taken as measured"
             )
-    return sheet, lines
+    return replace(sheet, machine=with_values(sheet.machine, values)) if lines else sheet, lines
 
 
 def _size(experiments: Sequence[Experiment], machine: Machine, name: str) -> tuple[float, float]:

@@ -26,7 +26,7 @@ class Starts:
     def __init__(self, experiment: Experiment, evidence: Evidence) -> None:
         sensors = evidence.stated.sensors
         angle, pressure = experiment.start()
-        self._noise = half_range = 2.0 * sensors.pressure_noise
+        self._of_lifting, half_range = 2.0 * np.array(sensors.pressure_noises)
         shown = not np.isnan(pressure)
         self._lifting = np.nan if shown else experiment.pressure_at_rest(PRESSURE_LIFTING)
         self.is_told = shown or not np.isnan(self._lifting)
@@ -41,7 +41,7 @@ class Starts:
         told = [(float(a), float(p)) for a, p in self._middle + self._half * points]
         if np.isnan(self._lifting):
             return told
-        high = self._lifting + self._noise * points[:, 1]
+        high = self._lifting + self._of_lifting * points[:, 1]
         return [
             (angle, self._below(machine, angle, float(p), otherwise))
             for (angle, otherwise), p, machine in zip(told, high, machines, strict=True)

@@ -18,13 +18,16 @@ STATED = np.array([0.0, 0.2e5, 0.2e5, 2e-5])  # Pa, Pa, rad
 SLOW = 5.4  # Hz, a boom that sways at rest
 
 
-def _read(times: tuple[float, float, float], sway: float = 0.0) -> Experiment:
+def _read(
+    times: tuple[float, float, float], sway: float = 0.0, stands: tuple[float, float] = (3.0, 0.0)
+) -> Experiment:
     """Return a recording whose sensors of p_H, p_S and bending have so many times their noise.
 
-    sway: of both pressures at rest, Pa.
+    sway: of both pressures, Pa. stands: s, before it moves and after.
     """
-    rest = np.zeros(round(3.0 / recorded.COMMAND_PERIOD))
-    seen = operated(MACHINE, np.concatenate([rest, recorded.moves(30.0, seed=5)]))
+    before, after = (np.zeros(round(t / recorded.COMMAND_PERIOD)) for t in stands)
+    moves = recorded.moves(30.0, seed=5)
+    seen = operated(MACHINE, np.concatenate([before, moves, after]))
     (ideal,) = free_runs([MACHINE], seen, [(0.8, 20e5)])
     outputs = ideal[:, COMPARED].copy()
     white = np.random.default_rng(8).standard_normal((len(outputs), 3))
@@ -44,6 +47,16 @@ def test_noise_beyond_the_stated_is_taken_as_measured(times: tuple[float, float,
     assert [line.split()[0] for line in lines] == noisier
     quiet = [noise(sheet.machine)[1 + k] for k, factor in enumerate(times) if factor == 1.0]
     assert set(quiet) <= set(STATED)
+
+
+def test_a_boom_that_stands_later_tells_it_as_well() -> None:
+    """Half as much again is not for sure within a second before the first move."""
+    times = (1.5, 1.0, 1.0)
+    sheet, _ = as_measured(SHEET, [_read(times, stands=(0.5, 0.0))])
+    assert sheet is SHEET
+    sheet, (line,) = as_measured(SHEET, [_read(times, stands=(0.5, 12.0))])
+    assert sheet.machine.sensors.pressure_noise == pytest.approx(1.5 * 0.2e5, rel=0.1)
+    assert line.startswith("pressure_lifting scatters by")
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells under their column names; floats are shown with three digits."""
+    """Rows of cells under their column names; floats with three digits, NaN as nothing."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str | float]]
@@ -137,7 +138,9 @@ def _table(table: Table) -> str:
 
 
 def _cell(cell: str | float) -> str:
-    return f"{cell:.3g}" if isinstance(cell, float) else str(cell)
+    if not isinstance(cell, float):
+        return str(cell)
+    return "" if math.isnan(cell) else f"{cell:.3g}"
 
 
 def _picture(picture: Picture) -> str:

@@ -107,9 +107,12 @@ def _times(where: str, stamps: columns.Times, start: int) -> Array:
     if not np.any(stamps):
         raise InputError(f"{where}: the headers' stamps are not set, all are 0; record with stamps")
     time = np.asarray((stamps - start) * 1e-9)
-    behind = np.flatnonzero(np.diff(time) <= 0.0)
+    gaps = np.diff(time)
+    behind = np.flatnonzero(gaps <= 0.0)
     if behind.size:
-        raise InputError(f"{where}: stamps out of order at {time[behind[0] + 1]:.3f} s")
+        first = int(behind[0])
+        what = "stamps out of order" if gaps[first] < 0.0 else "two messages with one stamp"
+        raise InputError(f"{where}: {what} at {time[first + 1]:.3f} s")
     return time
 
 

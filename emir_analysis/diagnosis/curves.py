@@ -1,6 +1,6 @@
 """Which curves a machine may be given for what has no name, and over what they run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class Curve:
     """What has no name, over a signal, (p,).
 
     name: of the machine's parameter group. unit: of the signal. parts: the group's lists that are
-    not zero, (p,) each, part_unit: theirs.
+    not zero, (p,) each, NaN at places beyond what was recorded, part_unit: theirs.
     """
 
     name: str
@@ -89,6 +89,22 @@ def curve(machine: Machine) -> Curve | None:
             part_unit = next(iter(units.values()))
             return Curve(kind.group, kind.over, kind.unit, signal, part_unit, parts)
     return None
+
+
+def as_far_as_recorded(whole: Curve, evidence: Evidence) -> Curve:
+    """Return a curve without the places of each part to whose sides no recording was.
+
+    One of two chambers may never have had the pressures of the other.
+    """
+    signal = np.array(whole.signal)
+    spacing = signal[1] - signal[0]
+    parts = {}
+    each = visited_by(whole, evidence)
+    for (name, points), seen in zip(whole.parts.items(), each, strict=True):
+        low, high = np.nanmin(seen) - spacing, np.nanmax(seen) + spacing
+        told = np.where((signal > low) & (signal < high), points, np.nan)
+        parts[name] = tuple(map(float, told))
+    return replace(whole, parts=parts)
 
 
 def told_forms(kind: Kind, evidence: Evidence) -> list[tuple[str, ...]]:
@@ -122,7 +138,7 @@ def visited_by(curve: Curve, evidence: Evidence) -> list[Array]:
     """Return where recordings were on the signal of each of a curve's parts, (n,), SI unit."""
     signal = visited(curve.over, evidence)
     if curve.over != OWN:
-        return [signal]
+        return [signal for _ in curve.parts]
     return [signal[:, ("lifting", "lowering").index(part)] for part in curve.parts]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
-from emir_analysis.diagnosis.curves import Curve, curve
+from emir_analysis.diagnosis.curves import Curve, as_far_as_recorded, curve
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -136,9 +136,15 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         swing=swings,
         where=lies,
         misstated=doubts.misstated,
-        curve=None if instead is None or doubts.misstated else curve(final.machine),
+        curve=_curve(final, evidence) if doubts.misstated == () else None,
         drift=drift(search.balanced, evidence, search.floor) if asked else None,
     )
+
+
+def _curve(final: Trial, evidence: Evidence) -> Curve | None:
+    """Return what has no name in a final machine, as far as recordings tell it."""
+    found = curve(final.machine)
+    return None if found is None else as_far_as_recorded(found, evidence)
 
 
 def _named(best: Trial, unaided: Array, search: Search, evidence: Evidence) -> tuple[Trial, Array]:

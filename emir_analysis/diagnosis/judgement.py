@@ -11,7 +11,9 @@ from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, lo
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 
+ANOTHER = 100.0  # times the noise: effects bring a machine's own sheet no further off
 BEYOND = 0.05  # share of the judge recordings
+CHAMBERS = {"lifting", "lowering"}
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 
 
@@ -38,7 +40,10 @@ def judgement(findings: Findings, judged: Judged) -> str:
         more += ", which other parameters inside the tolerances explain as well"
     if LOAD in findings.chosen.effects:
         more += "; a load from outside may have come at other times there"
-    return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: diagnose from that too"
+    advice = "diagnose from that too"
+    if off > ANOTHER and not judged.reconciled:
+        advice = "see whether it is of the same machine, then " + advice
+    return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: {advice}"
 
 
 def _foreseen(findings: Findings, judged: Judged) -> str:
@@ -100,9 +105,12 @@ def _furthest(curve: Curve, name: str) -> str:
 
     A compliance less than the vessels have, say, is not that chamber's: another has more.
     """
-    at, value = max(zip(curve.signal, curve.parts[name], strict=True), key=lambda p: abs(p[1]))
+    furthest = int(np.nanargmax(np.abs(curve.parts[name])))
+    at, value = curve.signal[furthest], curve.parts[name][furthest]
     part_unit, unit = ("" if u == "1" else f" {u}" for u in (curve.part_unit, curve.unit))
-    return f"as far as {value:.3g}{part_unit} {CURVE_PARTS[name]} at {at:.3g}{unit}"
+    comes_in = curve.name == "unnamed_leakage" and name in CHAMBERS and value < 0.0
+    which = f"{CURVE_PARTS[name]}{', into which oil comes,' if comes_in else ''}"
+    return f"as far as {value:.3g}{part_unit} {which} at {at:.3g}{unit}"
 
 
 def _beyond(curve: Curve, findings: Findings, judged: Judged) -> str:

@@ -24,11 +24,7 @@ QUIET = 1.3  # ... times what is stated of that
 TRAVEL = 0.1  # of the whole travel, which the boom makes upwards and downwards in that time
 NEGATIVE = -0.05  # of the pump's pressure; an absolute one is above 0, but for a bias
 FAR_OFF = 20.0  # times its noise: no noise of a sensor is as large
-NOISE = {  # of the sensors that have some
-    "pressure_lifting": "pressure_noise",
-    "pressure_lowering": "pressure_noise",
-    "tip_deflection_angle": "deflection_noise",
-}
+NOISY = ("pressure_lifting", "pressure_lowering", "tip_deflection_angle")  # sensors
 LEAST_MOTION = 20  # resolver steps of travel below which nothing can be told from a recording
 AGAINST = 0.5  # of the whole travel, on balance, by which a boom moves against its command
 AT_REST = 0.05  # of the whole travel: a boom that sinks through a leak before its first move
@@ -136,7 +132,7 @@ def _check_stuck(name: str, signal: Signal, angle: Array, machine: Machine) -> N
     In a steady move a pressure may show no more, and over a chamber that is empty for some time.
     angle: (n,) rad when the signal was measured.
     """
-    noise = getattr(machine.sensors, NOISE[signal.name]) if signal.name in NOISE else 0.0
+    noise = stated_noise(signal.name, machine)
     varied = np.std(signal.value) >= QUIET * noise
     count = int(STUCK / np.median(np.diff(signal.time)))
     for first in range(0, signal.value.size - count + 1, max(1, count // 10)):
@@ -151,6 +147,13 @@ def _check_stuck(name: str, signal: Signal, angle: Array, machine: Machine) -> N
             )
 
 
+def stated_noise(name: str, machine: Machine) -> float:
+    """Return the standard deviation that the data sheet states for a sensor, 0 for a resolver."""
+    sensors = machine.sensors
+    stated = (*sensors.pressure_noises, sensors.deflection_noise)
+    return dict(zip(NOISY, stated, strict=True)).get(name, 0.0)
+
+
 def _both_ways(angle: Array) -> float:
     """Return how far a boom moves upwards and downwards, rad: the lesser of the two."""
     up = np.max(angle - np.minimum.accumulate(angle))
@@ -163,7 +166,7 @@ def _ends(signal: Signal) -> tuple[float, ...]:
 
     A pressure's least is that of an empty chamber, an angle's are where the boom rests.
     """
-    if signal.name not in NOISE:
+    if signal.name not in NOISY:
         return ()
     highest, lowest = float(signal.value.max()), float(signal.value.min())
     return (highest,) if signal.name.startswith("pressure") else (highest, lowest)
@@ -194,7 +197,7 @@ def _is_frozen(  # noqa: PLR0913, PLR0917 (of one stretch of a recording)
     one step for as long as the boom rests, but does not jump then.
     """
     value = signal.value
-    if signal.name not in NOISE:
+    if signal.name not in NOISY:
         after = value[min(last + 1, value.size - 1)]
         return bool(abs(after - value[first]) > AT_REST * np.ptp(value))
     others = np.delete(np.diff(value), slice(first, last))

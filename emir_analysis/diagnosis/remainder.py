@@ -10,6 +10,7 @@ from emir_analysis.diagnosis.shape import PREDICTED_SHARE, Shape
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.where import LOCATED, Where
 
+DEFLECTION = "tip_deflection_angle"
 FLOWS = frozenset({"lifting_chamber", "lowering_chamber"})
 SHORT = 0.5  # of the recordings: a stretch of time that is named
 
@@ -35,7 +36,8 @@ def remainder(findings: Findings) -> str:
         return f"{keeps}; {_drifting(findings.drift)}"
     keeps += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
     by_force = speaking == "force" and FLOWS.isdisjoint(others)  # which no load disturbs
-    if by_force and _is_untold(shape, findings.swing, lies):
+    bent = shape.predictor == DEFLECTION  # as any force at the TCP bends the boom
+    if by_force and (bent or _is_untold(shape, findings.swing, lies)):
         keeps += (
             "; it may be a load from outside (wind, a push, a load that swings) of another"
             " course over time than those looked for"

@@ -74,7 +74,8 @@ def told_balances(result: Diagnosis) -> dict[str, BalanceResult]:
 def cautions(result: Diagnosis) -> list[str]:
     """Return what a reader has to know beside the statement, a line for each."""
     lines = [result.tell_apart] if result.tell_apart else []
-    if result.at_end:
+    is_model = result.verdict != "unexplained" or result.curve or result.misstated
+    if result.at_end and is_model:  # else what is missing has led the parameters there
         lines.append(
             f"at the end of what is allowed: {_ends(result)}; if this machine cannot be there,"
             " something else is missing"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from emir_analysis.diagnosis.recording_checks import FAR_OFF, LARGEST_GAP, NOISE
+from emir_analysis.diagnosis.recording_checks import FAR_OFF, LARGEST_GAP, stated_noise
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array, Signal
 from emir_plant.parameters import Machine
@@ -37,7 +37,7 @@ def tamed(name: str, signal: Signal, machine: Machine) -> Tame:
     they are more than MOST.
     """
     size = _size(signal, machine)
-    noise = getattr(machine.sensors, NOISE[signal.name]) if signal.name in NOISE else 0.0
+    noise = stated_noise(signal.name, machine)
 
     def found(shown: Signal) -> NDArray[np.bool_]:
         return _wild(shown, size) | _alone(shown, noise)
@@ -62,8 +62,7 @@ def _size(signal: Signal, machine: Machine) -> float:
     slow = np.median(np.diff(signal.time)) > SOON or signal.name == "tip_deflection_angle"
     whole = np.ptp(np.quantile(signal.value, [1.0 - NEARLY_ALL, NEARLY_ALL]))
     size = float((WILD if slow else WILD_AT_ONCE) * whole)
-    if signal.name in NOISE:
-        size = max(size, FAR_OFF * getattr(machine.sensors, NOISE[signal.name]))
+    size = max(size, FAR_OFF * stated_noise(signal.name, machine))
     return size if size > 0.0 else np.inf
 
 

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from operated import moved, without
 
-from emir_analysis.diagnosis.curves import KINDS, Curve, Kind, curve, ends, told_forms
+from emir_analysis.diagnosis.curves import (
+    KINDS,
+    Curve,
+    Kind,
+    as_far_as_recorded,
+    curve,
+    ends,
+    told_forms,
+)
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
@@ -33,6 +41,30 @@ def plain() -> Experiment:
 def told(experiment: Experiment) -> set[tuple[str, str, tuple[str, ...]]]:
     evidence = Evidence([experiment], joint1())
     return {(k.group, k.over, form) for k in KINDS for form in told_forms(k, evidence)}
+
+
+def test_a_curve_is_told_as_far_as_each_chamber_was(plain: Experiment) -> None:
+    """The lowering chamber never has the pressures of the lifting one."""
+    evidence = Evidence([plain], joint1())
+    places = tuple(np.linspace(0.0, 200e5, POINTS))
+    leak = (1e-6,) * POINTS
+    whole = Curve(
+        "unnamed_leakage",
+        "own_pressure",
+        "Pa",
+        places,
+        "m^3/s",
+        {"lifting": leak, "lowering": leak},
+    )
+    shown = as_far_as_recorded(whole, evidence).parts
+    for name, column in (("lifting", H), ("lowering", S)):
+        pressure = plain.outputs[:, column]
+        reached = np.interp(pressure, places, shown[name])  # NaN where a neighbour is
+        assert np.all(np.isfinite(reached))
+        told = np.array(places)[np.isfinite(shown[name])]
+        assert told[0] > pressure.min() - places[1]
+        assert told[-1] < pressure.max() + places[1]
+    assert np.nansum(shown["lowering"]) < np.nansum(shown["lifting"])
 
 
 def test_a_curve_wants_a_sensor_for_every_balance_in_which_it_acts(plain: Experiment) -> None:

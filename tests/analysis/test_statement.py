@@ -7,7 +7,7 @@ import pytest
 
 from emir_analysis.diagnosis import statement
 from emir_analysis.diagnosis.curves import Curve
-from emir_analysis.diagnosis.judgement import _beyond, _foreseen
+from emir_analysis.diagnosis.judgement import _beyond, _foreseen, _furthest
 from emir_analysis.diagnosis.remainder import _beside
 from emir_analysis.diagnosis.statement import _rejected
 
@@ -45,6 +45,20 @@ def test_a_leak_is_measured_no_further_than_its_own_chamber_was() -> None:
     assert "50 % lie beyond" in _beyond(leak, learned, other)
     lowering = Curve(*list(vars(leak).values())[:-1], {"lowering": (0, 0, 1)})
     assert _beyond(lowering, learned, other) == ""
+
+
+def test_a_leak_from_the_pump_is_told_as_oil_that_comes_in() -> None:
+    """At a pressure that the chamber had."""
+    places = tuple(np.linspace(9e5, 190e5, 4))
+    parts = {"lifting": (np.nan, -3e-6, -6.6e-6, 1e-7), "lowering": (1e-6, 0.0, np.nan, np.nan)}
+    leak = Curve("unnamed_leakage", "own_pressure", "Pa", places, "m^3/s", parts)
+    said = _furthest(leak, "lifting")
+    assert said == (
+        "as far as -6.6e-06 m^3/s of the lifting chamber, into which oil comes, at 1.3e+07 Pa"
+    )
+    assert _furthest(leak, "lowering") == (
+        "as far as 1e-06 m^3/s of the lowering chamber at 9e+05 Pa"
+    )
 
 
 @pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])

@@ -19,6 +19,7 @@ from emir_analysis.diagnosis.friction_laws import (
     viscous_is_heard,
     without_breakaway,
 )
+from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
@@ -190,9 +191,11 @@ class Whole:
     def plainer(self, fitted: Trial) -> Trial:
         """Return a trial with one size of an effect alone where that explains the whole as well.
 
-        Or with Coulomb's friction in place of one whose break-away may be none. Two sizes together
+        Or with Coulomb's friction in place of one whose break-away may be none, or with a late
+        command in place of sensors that are all equally late. Two sizes together
         may lead to where neither is right, such as a negative compliance.
         """
+        fitted = self._with_late_command(fitted)
         if not sticks(fitted):
             if _sizes(fitted) not in self._with_fewest:
                 fitted = self._with_fewer_sizes(fitted)
@@ -202,6 +205,14 @@ class Whole:
             fitted = min(smooth, fitted, key=self.score)
         self.keep(fitted)
         return fitted
+
+    def _with_late_command(self, fitted: Trial) -> Trial:
+        """Return a trial with a late command for sensors all equally late, if that is as good."""
+        begun = late_command(fitted, self._sheet)
+        if begun is None:
+            return fitted
+        late = refine_free_run(begun, self._evidence, fitted)
+        return late if self.score(late) <= self.score(fitted) else fitted
 
     def keep(self, fitted: Trial) -> None:
         """Take a trial as the one that is fitted with its effects."""

@@ -1,0 +1,39 @@
+"""Sensors that are all equally late are the same as a late command, which is one number."""
+
+import pytest
+from operated import moved
+
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
+from emir_analysis.diagnosis.late_command import late_command
+from emir_analysis.diagnosis.trial import trial
+from emir_analysis.diagnosis.whole import Whole
+from emir_common.parameter_tree import with_values
+from emir_plant.sheet import Sheet, joint1
+
+DELAY = 0.03  # s
+MACHINE = joint1()
+SHEET = Sheet(MACHINE, {}, {}, ())
+
+
+def test_a_late_command_is_told_though_late_sensors_were_chosen() -> None:
+    late = with_values(MACHINE, {"effects.command_delay.delay": DELAY})
+    evidence = Evidence([moved(late, 20.0, seed=6)], MACHINE)
+    floor = evidence.floor(MACHINE)
+    sensors = fit_free_run(fit_balances(trial(SHEET, ("sensor_delay",)), evidence, floor), evidence)
+    assert sensors.machine.effects.sensor_delay.angle == pytest.approx(DELAY, rel=0.1)
+    plain = Whole(evidence, SHEET, floor, lambda _: None).plainer(sensors)
+    assert plain.effects == ("command_delay",)
+    assert plain.machine.effects.command_delay.delay == pytest.approx(DELAY, rel=0.02)
+
+
+@pytest.mark.parametrize("apart", [0.5, 0.0])
+def test_sensors_that_are_late_by_times_of_their_own_stay(apart: float) -> None:
+    known = trial(SHEET, ("sensor_delay", "payload"))
+    slow = known.x.copy()
+    slow[0] *= 1.0 + apart
+    begun = late_command(known.at(slow), SHEET)
+    assert (begun is None) == bool(apart)
+    if begun is not None:
+        assert begun.effects == ("payload", "command_delay")
+        assert begun.machine.effects.command_delay.delay == pytest.approx(0.02)

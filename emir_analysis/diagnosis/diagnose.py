@@ -15,7 +15,6 @@ from emir_analysis.diagnosis.fitting import fit_balances, with_spread
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.misstated import misstated
 from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.search import Search
@@ -193,12 +192,11 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
 ) -> _Doubts:
     """Ask whether a value of the sheet, a curve or a drift says better what a verdict says.
 
-    Or play is a spring.
+    Or play is a spring: no effect explains that, but a value of the sheet may.
     """
-    if verdict != "unexplained" and spring_in_series(named, evidence) is not None:
-        return _Doubts(any=True)
-    replaced = _misstated(named, verdict, search, evidence, progress)
-    if replaced:
+    is_spring = verdict != "unexplained" and spring_in_series(named, evidence) is not None
+    replaced = _misstated(named, "unexplained" if is_spring else verdict, search, evidence)
+    if replaced or is_spring:
         return _Doubts(any=True, misstated=tuple(replaced))
     if verdict != "found" or at_noise(named, evidence):
         return _Doubts()
@@ -214,9 +212,7 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
     return _Doubts(any=_drifts(named, search, evidence))
 
 
-def _misstated(
-    named: Trial, verdict: str, search: Search, evidence: Evidence, progress: Progress
-) -> list[Trial]:
+def _misstated(named: Trial, verdict: str, search: Search, evidence: Evidence) -> list[Trial]:
     """Return the values of the sheet one of which says clearly better what is left.
 
     named: the effects, and the verdict on them. Of three none alone is like what is missing.
@@ -224,9 +220,8 @@ def _misstated(
     enough = excess(named, evidence) <= beyond(LEFT) and len(named.effects) < SEVERAL
     if verdict == "nothing_missing" or (verdict != "unexplained" and enough):
         return []
-    progress("asking whether one value of the data sheet is another")
     rival = search.refitted if verdict == "unexplained" else named
-    return misstated(search.balanced, rival, evidence, search.floor)
+    return search.misstated.better_than(rival)
 
 
 def _drifts(named: Trial, search: Search, evidence: Evidence) -> bool:

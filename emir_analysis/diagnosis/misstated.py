@@ -7,6 +7,7 @@ balances and on the free run for as long as that stays near; what promises most 
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from emir_analysis.diagnosis.select import STRONG, astray, at_noise, free_run_sc
 from emir_analysis.diagnosis.straight import Straight, least
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import ROUNDING, Unknown
+from emir_analysis.diagnosis.whole import Progress
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 
@@ -29,25 +31,38 @@ MOST_FITTED = 2  # of those that promise most on the balances, and on the free r
 PROMISING = 0.8  # of what parameters alone leave above the noise: the most, to first order
 
 
-def misstated(balanced: Trial, rival: Trial, evidence: Evidence, floor: Array) -> list[Trial]:
-    """Return parameters with one value of the sheet replaced, the last unknown, if that suffices.
+class Misstated:
+    """Parameters with one value of the sheet replaced, the last unknown, where that suffices.
 
-    And if it is clearly better than a rival: the best first, and those that are as good. balanced:
-    without effects, fitted to the balances. floor: (5,) of the balances.
+    balanced: without effects, fitted to the balances. floor: (5,) of the balances.
     """
-    starts = [_replaced(balanced, unknown) for unknown in _values(balanced)]
-    near = evidence.until(astray(balanced, evidence) + SHORTEST)
-    found = _promising(balanced, starts, in_free_run(balanced, near), FREE_RUN_STEP)
-    if np.any(evidence.fitted):
-        found |= _promising(balanced, starts, in_balances(evidence, floor), DIFFERENCE_STEP)
-    fitted = [_fitted(start, evidence, floor) for start in found.values()]
-    enough = [each for each in fitted if each is not None]
-    scores = [free_run_score(each, evidence, seen=0.0) for each in enough]
-    limit = free_run_score(rival, evidence, seen=0.0) - STRONG
-    best = min(scores, default=math.inf)
-    if best >= limit:
-        return []
-    return [enough[k] for k in np.argsort(scores) if scores[k] < best + STRONG]
+
+    def __init__(
+        self, balanced: Trial, evidence: Evidence, floor: Array, progress: Progress
+    ) -> None:
+        self._balanced, self._evidence, self._floor = balanced, evidence, floor
+        self._progress = progress
+
+    def better_than(self, rival: Trial) -> list[Trial]:
+        """Return them, if one is clearly better than a rival: the best first, and as good ones."""
+        scores = [free_run_score(each, self._evidence, seen=0.0) for each in self._enough]
+        limit = free_run_score(rival, self._evidence, seen=0.0) - STRONG
+        best = min(scores, default=math.inf)
+        if best >= limit:
+            return []
+        return [self._enough[k] for k in np.argsort(scores) if scores[k] < best + STRONG]
+
+    @cached_property
+    def _enough(self) -> list[Trial]:
+        self._progress("asking whether one value of the data sheet is another")
+        balanced, evidence, floor = self._balanced, self._evidence, self._floor
+        starts = [_replaced(balanced, unknown) for unknown in _values(balanced)]
+        near = evidence.until(astray(balanced, evidence) + SHORTEST)
+        found = _promising(balanced, starts, in_free_run(balanced, near), FREE_RUN_STEP)
+        if np.any(evidence.fitted):
+            found |= _promising(balanced, starts, in_balances(evidence, floor), DIFFERENCE_STEP)
+        fitted = [_fitted(start, evidence, floor) for start in found.values()]
+        return [each for each in fitted if each is not None]
 
 
 def _values(known: Trial) -> list[Unknown]:

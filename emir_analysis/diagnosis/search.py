@@ -8,6 +8,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following, refine_free_run
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
+from emir_analysis.diagnosis.misstated import Misstated
 from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import (
@@ -42,6 +43,7 @@ class Search:
     without which the whole is explained as well.
 
     balanced, refitted: the parameters alone, fitted to the balances and to the whole free run.
+    misstated: what one value of the sheet explains, if it is another.
     """
 
     def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
@@ -52,6 +54,7 @@ class Search:
         self.balanced = fit_balances(trial(sheet, ()), evidence, self.floor)
         self.refitted = fit_free_run(self.balanced, evidence)
         self.whole = Whole(evidence, sheet, self.floor, progress)
+        self.misstated = Misstated(self.balanced, evidence, self.floor, progress)
         self._rounds = Rounds(evidence, sheet, self.floor, self.whole, progress)
         self._equal: dict[tuple[str, ...], list[Trial]] = {}  # the best of each round, by effects
         self._settled: tuple[str, ...] = ()  # effects that are known to be needed
@@ -80,7 +83,7 @@ class Search:
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)
-        if not enough:
+        if not enough and not self.misstated.better_than(best.trial):
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
         if equal[0].effects and not needed.effects:  # beside none the whole may know more

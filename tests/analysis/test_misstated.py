@@ -7,7 +7,7 @@ from operated import moved, without
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
-from emir_analysis.diagnosis.misstated import misstated
+from emir_analysis.diagnosis.misstated import Misstated
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.curve import POINTS
@@ -22,7 +22,8 @@ def asked(experiment: Experiment, tolerances: dict[str, float] = TOLERANCES) -> 
     evidence = Evidence([experiment], sheet.machine)
     floor = evidence.floor(sheet.machine)
     balanced = fit_balances(trial(sheet, ()), evidence, floor)
-    return misstated(balanced, fit_free_run(balanced, evidence), evidence, floor)
+    asked = Misstated(balanced, evidence, floor, lambda _: None)
+    return asked.better_than(fit_free_run(balanced, evidence))
 
 
 def recording(values: dict[str, float]) -> Experiment:

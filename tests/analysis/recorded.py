@@ -158,8 +158,17 @@ def measured(
     }
 
 
-def write_bag(path: Path, topics: dict[str, tuple[Array, Array]], delay: float = 0.0) -> None:
-    """Write time, s, and value of each topic /rig/NAME; recorded `delay` s after their stamps."""
+def write_bag(
+    path: Path,
+    topics: dict[str, tuple[Array, Array]],
+    delay: float = 0.0,
+    *,
+    stamped_otherwise: bool = False,
+) -> None:
+    """Write time, s, and value of each topic /rig/NAME; recorded `delay` s after their stamps.
+
+    stamped_otherwise: every 10 ms in the order given, whatever the stamps are.
+    """
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
     header, stamp = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
@@ -168,14 +177,15 @@ def write_bag(path: Path, topics: dict[str, tuple[Array, Array]], delay: float =
         for name, (times, values) in topics.items():
             kind = f"sensor_msgs/msg/{'FluidPressure' if 'pressure' in name else 'JointState'}"
             connection = writer.add_connection(f"/rig/{name}", kind, typestore=store)
-            for time, value in zip(times, values, strict=True):
+            for number, (time, value) in enumerate(zip(times, values, strict=True)):
                 ns = START + round(time * 1e9)
                 head = header(stamp(ns // 10**9, ns % 10**9), "")
                 if "pressure" in name:
                     message = types[kind](head, float(value), 0.0)
                 else:
                     message = types[kind](head, ["joint"], np.array([value]), empty, empty)
-                recorded = ns + round(delay * 1e9)
+                recorded = START + number * 10**7 if stamped_otherwise else ns
+                recorded += round(delay * 1e9)
                 writer.write(connection, recorded, store.serialize_cdr(message, kind))
 
 

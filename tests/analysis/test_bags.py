@@ -122,7 +122,7 @@ def test_what_cannot_be_read_is_told_in_one_line(
     ("time", "value", "reason"),
     [
         (TIME[:1], ANGLE[:1], "too few"),
-        (np.append(TIME, 1.0), np.append(ANGLE, 0.0), "out of order at 1.000 s"),
+        (np.append(TIME, 1.0), np.append(ANGLE, 0.0), "two messages with one stamp at 1.000 s"),
         (TIME, np.where(TIME == 2.0, np.nan, ANGLE), "nan at 2.000 s"),
     ],
 )
@@ -131,6 +131,15 @@ def test_a_signal_that_is_none_is_told(
 ) -> None:
     recorded.write_bag(tmp_path / "bag", {"joint_states": (time, value)})
     with pytest.raises(InputError, match=reason):
+        load(tmp_path / "bag", {"angle": ANGLE_SOURCE})
+
+
+def test_stamps_that_go_back_are_told(tmp_path: Path) -> None:
+    time = TIME.copy()
+    time[[100, 101]] = time[[101, 100]]
+    topics = {"joint_states": (time, ANGLE)}
+    recorded.write_bag(tmp_path / "bag", topics, stamped_otherwise=True)
+    with pytest.raises(InputError, match=r"stamps out of order at 1\.000 s"):
         load(tmp_path / "bag", {"angle": ANGLE_SOURCE})
 
 

@@ -423,7 +423,7 @@ def _twice_the_same_time(topics: Topics) -> None:
         (_in_centimetres, "piston_stroke reaches .* more than a machine can; is it in mm or cm"),
         (_dead_sensor, "pressure_lowering is constant"),
         (_not_recorded, "topic /rig/boom_deflection is not recorded"),
-        (_twice_the_same_time, "/rig/cylinder: stamps out of order at 7.0"),
+        (_twice_the_same_time, "/rig/cylinder: two messages with one stamp at 7.0"),
     ],
 )
 def test_a_recording_of_no_use_is_told_with_what_to_record(

@@ -240,10 +240,10 @@ def experiment(name: str, recording: Recording, machine: Machine) -> Experiment:
     # one of the two may be that of a sensor that stands still
     moved = max((angle, _angles(shown[STROKE], machine)), key=np.ptp)
     check_motion(name, moved, machine)
+    check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)
     check_values(name, shown | {COMMAND: recording[COMMAND].value}, machine)
     for signal in sensors.values():
         check_readings(name, signal, time, angle, machine)
-    check_before_command(name, time - begin, angle, recording[COMMAND].time[0] - begin)
     check_direction(name, angle, np.append(commands, 0.0)[::every], machine)
     unknown = np.full(time.size, np.nan)
     outputs = np.stack([shown.get(output, unknown) for output in OUTPUTS], axis=1)

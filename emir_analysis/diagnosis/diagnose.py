@@ -135,7 +135,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         swing=swings,
         where=lies,
         misstated=doubts.misstated,
-        curve=_curve(final, evidence) if doubts.misstated == () else None,
+        curve=None if instead is None or doubts.misstated else _curve(final, evidence),
         drift=drift(search.balanced, evidence, search.floor) if asked else None,
     )
 

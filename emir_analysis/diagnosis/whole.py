@@ -253,8 +253,9 @@ class Whole:
         Where that leaves little, it has to come to the noise: else it is off as well.
         """
         if found.left_of_whole <= OFF:
-            return self._growths.at_noise(law) or found
-        led = self._growths.grown(law, min(found.trial, rival, key=self.score))
+            led = self._growths.at_noise(law) or found
+        else:
+            led = self._growths.grown(law, min(found.trial, rival, key=self.score))
         return min(found, led, key=lambda each: each.left_of_whole)
 
     def _fuller(self, found: Grown, fuller: list[Trial]) -> Grown:

@@ -11,7 +11,7 @@ from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, lo
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 
-ANOTHER = 100.0  # times the noise: effects bring a machine's own sheet no further off
+ANOTHER = 100.0  # times the noise: so far off what was learned is hardly of that machine
 BEYOND = 0.05  # share of the judge recordings
 CHAMBERS = {"lifting", "lowering"}
 PLACES = 3  # of the outputs: stroke and pressures, where a machine was

@@ -256,6 +256,9 @@ def _group(kind: type[Any], name: str, values: dict[str, Any]) -> Any:
             raise ParameterError(
                 f"{name}.{f.name}: missing; allowed is {f.metadata['quantity'].allowed}"
             )
-        if f.type in {int, "int"} and given.get(f.name, 0) % 1 != 0:
+        whole = f.type in {int, "int"}
+        if whole and given.get(f.name, 0) % 1 != 0:
             raise ParameterError(f"{name}.{f.name} = {given[f.name]}: not a whole number")
+        if f.name in given and not isinstance(given[f.name], tuple):
+            given[f.name] = int(given[f.name]) if whole else float(given[f.name])
     return kind(**given)

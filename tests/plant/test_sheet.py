@@ -23,6 +23,20 @@ def test_every_number_of_the_machine_has_a_source() -> None:
     assert sheet.machine == joint1()
 
 
+def test_a_length_written_without_a_point_is_no_whole_number(tmp_path: Path) -> None:
+    """A fit moves it by fractions."""
+    file = tmp_path / "sheet.yaml"
+    text = FILE.read_text()
+    assert "boom_mass: {value: 5000.0," in text
+    file.write_text(text.replace("boom_mass: {value: 5000.0,", "boom_mass: {value: 5000,"))
+    machine = load_sheet(file).machine
+    assert machine == joint1()
+    moved = with_values(machine, {"geometry.boom_mass": 5000.5})
+    assert moved.geometry.boom_mass == 5000.5
+    assert isinstance(machine.geometry.boom_mass, float)
+    assert isinstance(machine.sensors.resolver_bits, int)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

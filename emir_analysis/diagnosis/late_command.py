@@ -3,7 +3,6 @@
 import numpy as np
 
 from emir_analysis.diagnosis.trial import Trial, moved, trial
-from emir_common.parameter_tree import declared
 from emir_plant.effects.base import SENSORS
 from emir_plant.sheet import Sheet
 
@@ -18,10 +17,9 @@ def late_command(known: Trial, sheet: Sheet) -> Trial | None:
     """
     if SENSOR not in known.effects or COMMAND in known.effects:
         return None
-    values = {path: value for path, (_, value) in declared(known.machine).items()}
-    fitted = {unknown.path for unknown in known.unknowns.members}
+    fitted = known.unknowns.values(known.x)
     of_each = [f"effects.{SENSOR}.{name}" for name in SENSORS]
-    delays = np.array([values[path] for path in of_each if path in fitted])
+    delays = np.array([fitted[path] for path in of_each if path in fitted])
     if np.ptp(delays) > ALIKE * np.max(delays):
         return None
     others = known.without(SENSOR)

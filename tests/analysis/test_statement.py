@@ -5,11 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from emir_analysis.diagnosis import statement
+from emir_analysis.diagnosis import judgement, statement
+from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.judgement import _beyond, _foreseen, _furthest
-from emir_analysis.diagnosis.remainder import _beside
+from emir_analysis.diagnosis.remainder import _beside, remainder
 from emir_analysis.diagnosis.statement import _rejected
+from emir_analysis.diagnosis.where import Where
 
 QUIET = {"force": 1.0, "lifting_chamber": 1.0, "lowering_chamber": 1.0, "bending": 1.0}
 
@@ -59,6 +61,43 @@ def test_a_leak_from_the_pump_is_told_as_oil_that_comes_in() -> None:
     assert _furthest(leak, "lowering") == (
         "as far as 1e-06 m^3/s of the lowering chamber at 9e+05 Pa"
     )
+
+
+@pytest.mark.parametrize(
+    ("off", "reconciled", "asked"),
+    [(3948.7, False, True), (3948.7, True, False), (29.6, False, False)],
+)
+def test_a_recording_far_off_may_be_another_machine_s(
+    off: float, *, reconciled: bool, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learned = _recorded("a", [70.0, 200.0], [8.0, 60.0])
+    findings = SimpleNamespace(
+        verdict="nothing_missing", curve=None, misstated=(), evidence=learned,
+        chosen=SimpleNamespace(effects=(), machine=None),
+    )  # fmt: skip
+    judged = SimpleNamespace(
+        surprising=True, reconciled=reconciled, off=lambda _: off,
+        evidence=_recorded("b", [70.0, 200.0], [8.0, 60.0]),
+    )  # fmt: skip
+    monkeypatch.setattr(judgement, "loudest_signal", lambda *_: ("piston_stroke", off))
+    said = judgement.judgement(findings, judged)
+    assert ("see whether it is of the same machine" in said) == asked
+    assert said.endswith("diagnose from that too")
+
+
+def test_a_bending_that_goes_with_the_missing_force_may_be_a_load() -> None:
+    """As any force at the TCP bends the boom; a force by the velocity is none."""
+    column = list(BALANCES).index("force")
+    findings = SimpleNamespace(
+        speaking="force", verdict="unexplained", swing=None, curve=None, misstated=(), drift=None,
+        residuals={"refitted": np.eye(5)[column] * np.ones((40, 1)) * 9.0},
+        floor=np.ones(5), limit=np.full(5, 2.0),
+        where=Where(0.0, 90.0),
+        evidence=SimpleNamespace(duration=lambda _: 90.0, place=lambda t: ("a", t)),
+    )  # fmt: skip
+    for predictor, load in (("tip_deflection_angle", True), ("piston_velocity", False)):
+        findings.shape = SimpleNamespace(predictor=predictor, share=0.8, by_direction=False)
+        assert ("it may be a load from outside" in remainder(findings)) == load
 
 
 @pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])

@@ -254,6 +254,29 @@ def test_machines_are_drawn_where_a_fit_does_not_find_back(
     assert len(drawn) == draws
 
 
+def test_a_law_is_led_to_the_whole_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Again where its beginning is clearly better, and not at all where that is too far off."""
+    _, sheet, evidence = search({})
+    law, led = fullest(trial(sheet, ()), sheet), []
+    whole = max(float(e.time[-1]) for e in evidence.experiments)
+    beginnings = iter([1.09, 1.08, 1.05, 1.2])
+
+    def lead(*arguments: object) -> tuple[Solution, float]:
+        led.append(arguments)
+        return at(law, 1.3), whole
+
+    monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: at(law, next(beginnings)))
+    monkeypatch.setattr(stick_slip, "led_on", lead)
+    growths = Growths(evidence)
+    first = growths.grown(law)
+    assert growths.grown(law) is first
+    assert len(led) == 1
+    assert growths.grown(law) is not first
+    assert len(led) == 2
+    assert Growths(evidence).at_noise(law) is None
+    assert len(led) == 2
+
+
 def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction by the load in the machine, Coulomb's is led along; the rival has the truth."""
     load = {

@@ -4,6 +4,7 @@ import gc
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,3 +21,13 @@ def ros(ros_domain: int) -> Iterator[None]:
     yield
     rclpy.try_shutdown()
     gc.collect()  # else the test's nodes may stay in this domain, which has its turn again
+
+
+@pytest.fixture
+def executor(ros: None) -> Iterator[Any]:
+    """Give an executor, shut down at the end: left over, it may complain when it is collected."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    made = SingleThreadedExecutor()
+    yield made
+    made.shutdown()

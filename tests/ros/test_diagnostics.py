@@ -69,6 +69,7 @@ def _graph(*makes: Callable[[], Node]) -> Iterator[Graph]:
     try:
         yield graph
     finally:
+        graph.executor.shutdown()
         for node in (graph.listener, *graph.nodes):
             node.destroy_node()
         rclpy.shutdown()

@@ -59,7 +59,9 @@ SIGNALS = {
 class Bench:
     """The force loop on a test bench: time and inputs are given to it, its commands heard."""
 
-    def __init__(self, *commands: Topic, before: Sequence[Node] = ()) -> None:
+    def __init__(
+        self, executor: SingleThreadedExecutor, *commands: Topic, before: Sequence[Node] = ()
+    ) -> None:
         """commands: what it is given; before: nodes that make its command of that."""
         self.loop = ForceLoopNode(SIM_TIME)
         self._nodes = [self.loop, *before]
@@ -75,7 +77,7 @@ class Bench:
         }
         kind = conversions.message_class(VALVE_COMMAND.type)
         self.node.create_subscription(kind, VALVE_COMMAND.name, self._on_valve, profile)
-        self._executor = SingleThreadedExecutor()
+        self._executor = executor
         for node in (*self._nodes, self.node):
             self._executor.add_node(node)
         self._clock = SimClock(self.node, self._executor)
@@ -114,8 +116,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench(ros: None) -> Bench:
-    made = Bench()
+def bench(executor: SingleThreadedExecutor) -> Bench:
+    made = Bench(executor)
     made.settle()
     return made
 
@@ -131,10 +133,13 @@ def test_one_message_in_twenty_lost_changes_nothing(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("command", [VELOCITY_COMMAND, OFFERED], ids=lambda topic: topic.name)
-def test_a_command_is_acted_on_when_it_comes(command: Topic, ros: None) -> None:
+def test_a_command_is_acted_on_when_it_comes(
+    command: Topic, executor: SingleThreadedExecutor
+) -> None:
     """Also by way of the selector: timers on the way would delay it by up to a period each."""
     chosen = [*SIM_TIME, "-p", "controllers:=[cascade]"]
-    bench = Bench(command, before=[SelectorNode(chosen)] if command is OFFERED else [])
+    selectors = [SelectorNode(chosen)] if command is OFFERED else []
+    bench = Bench(executor, command, before=selectors)
     bench.settle()
     for k in range(40):
         before = len(bench.valve)
@@ -162,11 +167,12 @@ def test_commands_late_by_100_ms_shut_the_valve_and_open_it_when_they_come(bench
         bench.tick()
 
 
-def test_the_reference_stops_where_the_machine_does_not_follow(ros: None) -> None:
+def test_the_reference_stops_where_the_machine_does_not_follow(
+    executor: SingleThreadedExecutor,
+) -> None:
     """It would else be caught up with at full speed once the valve may open again."""
     far = [w for value in ("distance:=0.5", "speed:=0.1", "delay:=0.0") for w in ("-p", value)]
     node, operator = TrajectoryNode([*SIM_TIME, *far]), Node("operator")
-    executor = SingleThreadedExecutor()
     for each in (node, operator):
         executor.add_node(each)
     clock, wanted = SimClock(operator, executor), CYLINDER_REFERENCE
@@ -209,10 +215,10 @@ def test_the_reference_stops_where_the_machine_does_not_follow(ros: None) -> Non
             each.destroy_node()
 
 
-def test_who_is_chosen_takes_over_from_a_dead_controller(ros: None) -> None:
+def test_who_is_chosen_takes_over_from_a_dead_controller(executor: SingleThreadedExecutor) -> None:
     """The one that drove need not come back, nor be waited for."""
     selector = SelectorNode([*SIM_TIME, "-p", "controllers:=[cascade, pfc]"])
-    bench = Bench(OFFERED, OFFERED_COMMANDS["pfc"], before=[selector])
+    bench = Bench(executor, OFFERED, OFFERED_COMMANDS["pfc"], before=[selector])
     bench.settle()
     alive = [topic for topic in bench.inputs if topic is not OFFERED]
     deadline = time.monotonic() + DEADLINE

@@ -79,6 +79,7 @@ def test_activated_and_deactivated_by_its_services() -> None:
         with pytest.raises(ParameterError, match="autostart: lock step needs every node"):
             CascadeNode([*LATER, "-p", "lockstep:=true"])
     finally:
+        executor.shutdown()
         for node in nodes:
             node.destroy_node()
         rclpy.shutdown()

@@ -105,12 +105,11 @@ def test_the_law_has_what_was_set(make: Callable[[], Node], name: str, value: fl
     node.destroy_node()
 
 
-def test_a_change_is_recorded(tmp_path: Path) -> None:
+def test_a_change_is_recorded(tmp_path: Path, executor: SingleThreadedExecutor) -> None:
     bag = tmp_path / "run"
     words = [f"bag:={bag}", f"topics:=[{CASCADE_TERMS.name}]", "nodes:=[cascade_node]"]
     recorder = RecorderNode(["--ros-args", *(w for p in words for w in ("-p", p))])
     cascade = CascadeNode()
-    executor = SingleThreadedExecutor()
     for node in (recorder, cascade):
         executor.add_node(node)
 

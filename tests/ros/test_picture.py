@@ -59,6 +59,7 @@ def test_what_is_shown_bends_as_the_model_does() -> None:
             if len(heard) == 2:
                 break
     finally:
+        executor.shutdown()
         for node in (listener, plant):
             node.destroy_node()
         rclpy.shutdown()
@@ -113,6 +114,7 @@ def test_the_description_is_printed_as_the_plant_publishes_it(
             if heard:
                 break
     finally:
+        executor.shutdown()
         for node in (listener, plant):
             node.destroy_node()
         rclpy.shutdown()

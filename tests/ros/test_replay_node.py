@@ -67,11 +67,14 @@ def _spin(nodes: list[Any], until: Callable[[], object]) -> None:
     for node in nodes:
         executor.add_node(node)
     deadline = time.monotonic() + DEADLINE
-    while not until():
-        assert time.monotonic() < deadline
-        executor.spin_once(timeout_sec=0.1)
-    for node in nodes:
-        executor.remove_node(node)
+    try:
+        while not until():
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+        executor.shutdown()
 
 
 @pytest.mark.usefixtures("ros")

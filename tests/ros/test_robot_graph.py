@@ -134,6 +134,7 @@ def test_description_and_its_joints_are_published() -> None:
         assert at["joint1"] == pytest.approx(Posture().joint1, abs=1e-3)
         assert at["arm1_section2_pitch"] > 1e-5  # bent down by the weight
     finally:
+        executor.shutdown()
         listener.destroy_node()
         plant.destroy_node()
         rclpy.shutdown()

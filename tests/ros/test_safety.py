@@ -167,6 +167,7 @@ def _graph(
     try:
         yield graph
     finally:
+        graph.executor.shutdown()
         for node in graph.nodes:
             node.destroy_node()
         rclpy.shutdown()

@@ -32,7 +32,7 @@ def _words(**parameters: Any) -> list[str]:
     return ["--ros-args", *(word for pair in pairs for word in pair)]
 
 
-def test_a_controller_lives_in_the_recordings_time() -> None:
+def test_a_controller_lives_in_the_recordings_time(executor: SingleThreadedExecutor) -> None:
     """Renamed and in a namespace as well; in its own time the inputs would be stale at once."""
     topics = "['/cylinder_reference','/cylinder_states']"
     replay = ReplayNode(
@@ -52,7 +52,6 @@ def test_a_controller_lives_in_the_recordings_time() -> None:
         JointState, "/left/wanted/speed", lambda m: stamps.append(stamp_ns(m)), 100
     )
     nodes = (replay, cascade, listener)
-    executor = SingleThreadedExecutor()
     for node in nodes:
         executor.add_node(node)
 
@@ -88,10 +87,9 @@ def test_a_controller_lives_in_the_recordings_time() -> None:
 
 
 @pytest.mark.parametrize("jump", [0, -HOUR, 1000 * HOUR], ids=["on", "set back", "set on"])
-def test_the_machine_lives_in_the_clocks_time(jump: int) -> None:
+def test_the_machine_lives_in_the_clocks_time(executor: SingleThreadedExecutor, jump: int) -> None:
     """A plant period of /clock is one of the machine, also after the clock was set."""
     listener, plant = Node("listener"), PlantNode(SIM_TIME)
-    executor = SingleThreadedExecutor()
     for node in (plant, listener):
         executor.add_node(node)
     clock = SimClock(listener, executor)

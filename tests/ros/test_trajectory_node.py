@@ -64,9 +64,9 @@ class Bench(Node):
         self._waypoints = self.create_publisher(JointTrajectory, "joint_trajectory", 10)
         self.create_subscription(kind, self._reference.name, self._on_reference, profile)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
-        self._executor = SingleThreadedExecutor()
+        self.spinning = SingleThreadedExecutor()
         for node in (self, self.node):
-            self._executor.add_node(node)
+            self.spinning.add_node(node)
         self.until(lambda: self._waypoints.get_subscription_count() == 1)
         self.until(lambda: self.count_publishers("/diagnostics") == 1)
 
@@ -81,7 +81,7 @@ class Bench(Node):
         deadline = time.monotonic() + 120.0
         while not condition():
             assert time.monotonic() < deadline
-            self._executor.spin_once(timeout_sec=0.01)
+            self.spinning.spin_once(timeout_sec=0.01)
             self.node.check()
 
     def run(self, duration: float) -> None:
@@ -125,6 +125,7 @@ def _bench(model: str, *more: str) -> Iterator[Bench]:
     try:
         yield bench
     finally:
+        bench.spinning.shutdown()
         bench.node.destroy_node()
         bench.destroy_node()
         rclpy.shutdown()

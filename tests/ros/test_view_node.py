@@ -39,10 +39,9 @@ def port(ros: None) -> int:
         return int(probe.getsockname()[1])
 
 
-def test_the_page_shows_what_is_published(port: int) -> None:
+def test_the_page_shows_what_is_published(port: int, executor: SingleThreadedExecutor) -> None:
     view = ViewNode(["--ros-args", "-p", f"port:={port}"])
     machine = Shell("machine", SENT)
-    executor = SingleThreadedExecutor()
     executor.add_node(view)
     executor.add_node(machine)
     stamp = 0
@@ -57,12 +56,11 @@ def test_the_page_shows_what_is_published(port: int) -> None:
     view.close()
 
 
-def test_inactive_it_takes_nothing_in(port: int) -> None:
+def test_inactive_it_takes_nothing_in(port: int, executor: SingleThreadedExecutor) -> None:
     view = ViewNode(["--ros-args", "-p", f"port:={port}", "-p", "autostart:=false"])
     machine, ticks, heard = Shell("machine", SENT), [], []
     machine.hear(CYLINDER_STATES, heard.append, qos.requested(CYLINDER_STATES, lockstep=False))
     machine.create_timer(PERIOD, lambda: ticks.append(time.monotonic()))
-    executor = SingleThreadedExecutor()
     for node in (view, machine):
         executor.add_node(node)
     deadline, stamps = time.monotonic() + DEADLINE, itertools.count(8_000_000, 8_000_000)
@@ -83,11 +81,12 @@ def test_inactive_it_takes_nothing_in(port: int) -> None:
     view.close()
 
 
-def test_what_is_no_longer_published_is_no_longer_shown(port: int) -> None:
+def test_what_is_no_longer_published_is_no_longer_shown(
+    port: int, executor: SingleThreadedExecutor
+) -> None:
     """One topic that falls silent has a dash, all of them are told of; the next run is shown."""
     view = ViewNode(["--ros-args", "-p", f"port:={port}"])
     machine, other = Shell("machine", [CYLINDER_STATES]), Shell("other", [PRESSURE_LIFTING])
-    executor = SingleThreadedExecutor()
     for node in (view, machine, other):
         executor.add_node(node)
     deadline, stamps = time.monotonic() + DEADLINE, itertools.count(5_000_000_000_000, 8_000_000)
@@ -127,13 +126,14 @@ SHOWN = {
 
 
 @pytest.mark.parametrize("model", SHOWN)
-def test_a_browser_shows_the_running_graph(port: int, model: str) -> None:
+def test_a_browser_shows_the_running_graph(
+    port: int, executor: SingleThreadedExecutor, model: str
+) -> None:
     """What changes in the graph changes on the open page, and its controls do not stop it."""
     topics, given, name = SHOWN[model]
     everything = {signal: 0.1 for topic in topics for signal in topic.fields} | given
     view_node = ViewNode(["--ros-args", "-p", f"port:={port}", "-p", f"model:={model}"])
     machine = Shell("machine", topics)
-    executor = SingleThreadedExecutor()
     for node in (view_node, machine):
         executor.add_node(node)
     stamps = itertools.count(0, 8_000_000)
@@ -163,7 +163,6 @@ def test_a_browser_shows_the_running_graph(port: int, model: str) -> None:
         over.set()
         spinning.join()
         view_node.close()
-        executor.shutdown()
 
 
 def test_a_port_that_is_taken_is_told(port: int) -> None:

@@ -24,5 +24,9 @@ def late_command(known: Trial, sheet: Sheet) -> Trial | None:
         return None
     others = known.without(SENSOR)
     begun = trial(sheet, (*others.effects, COMMAND), others)
-    delay = begun.unknowns.members[-1].at(float(np.mean(delays)))
-    return begun.at(moved(begun.x, [begun.x.size - 1], [delay]))
+    dead_share = known.machine.effects.sensor_delay.dead_share
+    values = {"delay": float(np.mean(delays)), "lag_share": 1.0 - dead_share}
+    places = {unknown.path: k for k, unknown in enumerate(begun.unknowns.members)}
+    where = [places[f"effects.{COMMAND}.{name}"] for name in values]
+    at = [begun.unknowns.members[k].at(v) for k, v in zip(where, values.values(), strict=True)]
+    return begun.at(moved(begun.x, where, at))

@@ -25,6 +25,7 @@ from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK, PERIODS
 from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.telling import between_steps, untold
 from emir_analysis.diagnosis.trial import Trial
+from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.diagnosis.where import Where
 from emir_analysis.outputs import write_text
 from emir_analysis.root_mean_square import column_rms
@@ -295,6 +296,8 @@ def effect_results(
                 low, high, note = value, value, SET
                 if path in undecided:
                     low, high, note = 0.0, 1.0, OPEN
+                elif is_share(path):
+                    note = f"{1.0 - value:.0f} explains it worse"
                 parameters[parameter] = ParameterResult(
                     value, about.unit, low, high, (), about.meaning, note
                 )

@@ -4,9 +4,11 @@ The delay line keeps the time integral of the command at the instants at which t
 changed. What arrives during an integration step is the mean of the delayed command over it, a
 difference of two such integrals: exact for any delay, not only for multiples of the step, and
 so a smooth function of the delay. Commands that change more often than the line has room for
-are kept as their mean between two samples.
+are kept as their mean between two samples. What lags goes through a first-order filter behind
+that, exact for a command that is the same all along a step.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,7 +21,8 @@ from emir_plant.jit import compiled, compiled_in_place
 
 Array = NDArray[np.float64]
 
-LATEST, INTEGRAL, TIMES = 0, 1, 2  # the line: command, its integral, then the samples' times ...
+# The line: command, its integral, the filter's state, then the samples' times ...
+LATEST, INTEGRAL, LAGGING, TIMES = range(4)
 SAMPLES = 16
 INTEGRALS = TIMES + SAMPLES  # ... and integrals, newest first
 SIZE = INTEGRALS + SAMPLES
@@ -28,14 +31,18 @@ LONG_AGO = -1.0  # s: before the start, by more than any delay, the command was 
 
 @dataclass(frozen=True)
 class CommandDelay(Effect):
-    """Pure delay between the valve command y2 and the current: y2(t - T)."""
+    """A command that comes late by T between y2 and the current: y2(t - T).
+
+    lag_share of T is a first-order lag (filter, amplifier), the rest dead time.
+    """
 
     balance: ClassVar[Balance] = "valve"
     sizes: ClassVar[tuple[str, ...]] = ("delay",)
     source: ClassVar[str] = "computing, bus and amplifier: one control period of 32 ms and less"
-    trial: ClassVar[dict[str, float]] = {"delay": 0.02}
+    trial: ClassVar[dict[str, float]] = {"delay": 0.02, "lag_share": 0.5}
 
     delay: float = quantity("s", 0.0, 0.2, "T", default=0.0)
+    lag_share: float = quantity("1", 0.0, 1.0, "share of T that is a lag", default=0.0)
 
 
 @compiled
@@ -49,9 +56,10 @@ def empty_line() -> Array:
 @compiled_in_place
 def arriving(line: Array, command: float, now: float, step: float, p: Any) -> float:
     """Return the mean command at the valve from now, s, over a step, s; update the line."""
-    delay = p.command_delay_delay
-    if delay == 0.0:
+    if p.command_delay_delay == 0.0:
         return command
+    lag = p.command_delay_lag_share * p.command_delay_delay
+    delay = p.command_delay_delay - lag
     if command != line[LATEST]:
         if now - line[TIMES] >= delay / (SAMPLES - 2):
             for k in range(SAMPLES - 1, 0, -1):
@@ -61,7 +69,19 @@ def arriving(line: Array, command: float, now: float, step: float, p: Any) -> fl
         line[LATEST] = command
     line[INTEGRAL] += command * step
     end = now + step
-    return (_integral(line, end - delay, end) - _integral(line, now - delay, end)) / step
+    dead = (_integral(line, end - delay, end) - _integral(line, now - delay, end)) / step
+    return _lagged(line, dead, lag, step)
+
+
+@compiled_in_place
+def _lagged(line: Array, command: float, lag: float, step: float) -> float:
+    """Return the mean over a step, s, of a command, all along it the same, behind a lag, s."""
+    if lag == 0.0:
+        return command
+    kept = math.exp(-step / lag)
+    behind = line[LAGGING] - command
+    line[LAGGING] = command + kept * behind
+    return command + behind * (1.0 - kept) * lag / step
 
 
 @compiled_in_place

@@ -16,8 +16,10 @@ MACHINE = joint1()
 SHEET = Sheet(MACHINE, {}, {}, ())
 
 
-def test_a_late_command_is_told_though_late_sensors_were_chosen() -> None:
-    late = with_values(MACHINE, {"effects.command_delay.delay": DELAY})
+@pytest.mark.parametrize("lag_share", [0.0, 1.0])
+def test_a_late_command_is_told_though_late_sensors_were_chosen(lag_share: float) -> None:
+    hidden = {"delay": DELAY, "lag_share": lag_share}
+    late = with_values(MACHINE, {f"effects.command_delay.{name}": hidden[name] for name in hidden})
     evidence = Evidence([moved(late, 20.0, seed=6)], MACHINE)
     floor = evidence.floor(MACHINE)
     sensors = fit_free_run(fit_balances(trial(SHEET, ("sensor_delay",)), evidence, floor), evidence)
@@ -25,6 +27,7 @@ def test_a_late_command_is_told_though_late_sensors_were_chosen() -> None:
     plain = Whole(evidence, SHEET, floor, lambda _: None).plainer(sensors)
     assert plain.effects == ("command_delay",)
     assert plain.machine.effects.command_delay.delay == pytest.approx(DELAY, rel=0.02)
+    assert plain.machine.effects.command_delay.lag_share == pytest.approx(lag_share, abs=0.05)
 
 
 @pytest.mark.parametrize("apart", [0.5, 0.0])
@@ -37,3 +40,6 @@ def test_sensors_that_are_late_by_times_of_their_own_stay(apart: float) -> None:
     if begun is not None:
         assert begun.effects == ("payload", "command_delay")
         assert begun.machine.effects.command_delay.delay == pytest.approx(0.02)
+        dead_share = known.machine.effects.sensor_delay.dead_share
+        lag_share = begun.machine.effects.command_delay.lag_share
+        assert lag_share == pytest.approx(1.0 - dead_share)

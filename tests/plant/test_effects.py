@@ -702,8 +702,22 @@ def test_delay_line_keeps_a_command_that_changes_all_the_time() -> None:
     assert abs(np.mean(arrived - expected)) < 1e-3
 
 
-def test_delayed_commands_are_what_the_run_itself_delays() -> None:
-    plant = _with(command_delay={"delay": 0.0237})
+@pytest.mark.parametrize("lag_share", [0.05, 0.5, 1.0])
+def test_a_lagging_command_rises_as_a_filters_does(lag_share: float) -> None:
+    """A step in closed form, as the mean over each period: late by T in all, whatever lags."""
+    delay, dt, on = 0.04, 1e-3, 100
+    p = _with(command_delay={"delay": delay, "lag_share": lag_share}).record
+    arrived = command_delay.delayed(np.repeat([0.0, 0.5], [on, 1000]), dt, p)
+    lag = lag_share * delay
+    since = np.maximum((np.arange(arrived.size + 1) - on) * dt - (delay - lag), 0.0)
+    reached = 0.5 * (since + lag * np.expm1(-since / lag))
+    assert arrived == pytest.approx(np.diff(reached) / dt, abs=1e-12)
+    assert np.sum(0.5 - arrived[on:]) * dt == pytest.approx(0.5 * delay)
+
+
+@pytest.mark.parametrize("lag_share", [0.0, 0.6])
+def test_delayed_commands_are_what_the_run_itself_delays(lag_share: float) -> None:
+    plant = _with(command_delay={"delay": 0.0237, "lag_share": lag_share})
     start = plant.initial(FORTY_FIVE, 20e5)
     commands = np.repeat(np.random.default_rng(1).uniform(-0.8, 0.8, 40), 32)
     arrived = command_delay.delayed(commands, 1e-3, plant.record)

@@ -32,6 +32,9 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
+LIKE = (
+    1.5  # times the noise: more, where nothing sticks, and an effect is only like what is missing
+)
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 
 
@@ -250,6 +253,8 @@ def _verdict(final: Trial, after: Array, evidence: Evidence, *, rivals: int) -> 
         return "unexplained"
     if not final.effects:
         return "nothing_missing"
+    if not sticks(final) and excess(final, evidence) > beyond(LIKE):
+        return "unexplained"
     return "ambiguous" if rivals else "found"
 
 

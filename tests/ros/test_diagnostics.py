@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from waiting import until
 
 from emir_common.quantity import ParameterError
 from emir_msgs_py.topics import JOINT_STATES, VALVE_COMMAND, VELOCITY_COMMAND
@@ -46,10 +46,7 @@ class Graph:
 
     def until(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < deadline, self.values
-            self.executor.spin_once(timeout_sec=0.02)
+        until(condition, lambda: self.executor.spin_once(timeout_sec=0.02), lambda: self.values)
 
     def lose(self, node: Node) -> None:
         """Let a node die."""

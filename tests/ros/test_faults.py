@@ -20,7 +20,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
-from sim_clock import DEADLINE, SIM_TIME, SimClock
+from sim_clock import SIM_TIME, SimClock
+from waiting import DEADLINE, until
 
 from emir_analysis.recover import recover
 from emir_msgs_py import conversions
@@ -91,10 +92,7 @@ class Bench:
 
     def until(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < deadline
-            self._executor.spin_once(timeout_sec=0.01)
+        until(condition, lambda: self._executor.spin_once(timeout_sec=0.01))
 
     def tick(self, inputs: Any = None, step: int = PLANT_PERIOD_NS) -> None:
         """Let time go on by a step, ns, and then give the inputs, all unless said otherwise."""
@@ -109,10 +107,7 @@ class Bench:
 
     def settle(self) -> None:
         """Run until the valve opens."""
-        deadline = time.monotonic() + DEADLINE
-        while not (self.valve and self.valve[-1] > 0.0):
-            assert time.monotonic() < deadline
-            self.tick()
+        until(lambda: self.valve and self.valve[-1] > 0.0, self.tick)
 
 
 @pytest.fixture
@@ -188,13 +183,13 @@ def test_the_reference_stops_where_the_machine_does_not_follow(
     )
     still = dict.fromkeys(CYLINDER_STATES.fields, 0.0) | {"stroke": 0.4}
 
-    def run(until: Callable[[], object]) -> None:
-        deadline = time.monotonic() + DEADLINE
-        while not until():
-            assert time.monotonic() < deadline
-            clock.advance([node])
-            states.publish(conversions.message(CYLINDER_STATES, clock.now, still))
-            clock.settle()
+    def go_on() -> None:
+        clock.advance([node])
+        states.publish(conversions.message(CYLINDER_STATES, clock.now, still))
+        clock.settle()
+
+    def run(condition: Callable[[], object]) -> None:
+        until(condition, go_on)
 
     try:
         run(lambda: heard)
@@ -221,15 +216,10 @@ def test_who_is_chosen_takes_over_from_a_dead_controller(executor: SingleThreade
     bench = Bench(executor, OFFERED, OFFERED_COMMANDS["pfc"], before=[selector])
     bench.settle()
     alive = [topic for topic in bench.inputs if topic is not OFFERED]
-    deadline = time.monotonic() + DEADLINE
-    while bench.valve[-1] != 0.0:
-        assert time.monotonic() < deadline
-        bench.tick(alive)
+    until(lambda: bench.valve[-1] == 0.0, lambda: bench.tick(alive))
     assert selector.chosen == "cascade"
     selector.set_parameters([Parameter("controller", value="pfc")])
-    while bench.valve[-1] == 0.0:
-        assert time.monotonic() < deadline
-        bench.tick(alive)
+    until(lambda: bench.valve[-1] != 0.0, lambda: bench.tick(alive))
     assert selector.chosen == "pfc"
 
 
@@ -247,10 +237,7 @@ def test_two_machines_at_once_shut_the_valve(bench: Bench) -> None:
     """Sensors that two nodes publish are those of neither."""
     kind = conversions.message_class(JOINT_STATES.type)
     second = bench.node.create_publisher(kind, JOINT_STATES.name, qos.offered(lockstep=False))
-    deadline = time.monotonic() + DEADLINE
-    while bench.valve[-1] != 0.0:
-        assert time.monotonic() < deadline
-        bench.tick()
+    until(lambda: bench.valve[-1] == 0.0, bench.tick)
     bench.node.destroy_publisher(second)
     bench.settle()
 
@@ -258,11 +245,12 @@ def test_two_machines_at_once_shut_the_valve(bench: Bench) -> None:
 def test_a_message_without_its_number_counts_as_none(bench: Bench) -> None:
     """It ends no node; without another command the valve shuts, and opens when one comes."""
     others = [topic for topic in INPUTS if topic is not VELOCITY_COMMAND]
-    deadline = time.monotonic() + DEADLINE
-    while bench.valve[-1] != 0.0:
-        assert time.monotonic() < deadline
+
+    def go_on() -> None:
         bench.empty(VELOCITY_COMMAND)
         bench.tick(others)
+
+    until(lambda: bench.valve[-1] == 0.0, go_on)
     assert bench.loop.failure is None
     assert bench.loop.diagnostics.counts["messages of another form"] > 0
     bench.settle()
@@ -292,10 +280,7 @@ def test_a_stranger_on_the_commands_topic_shuts_the_valve(bench: Bench) -> None:
     )
     with subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL) as stranger:
         try:
-            deadline = time.monotonic() + DEADLINE
-            while bench.valve[-1] != 0.0:
-                assert time.monotonic() < deadline
-                bench.tick()
+            until(lambda: bench.valve[-1] == 0.0, bench.tick)
             stranger.send_signal(signal.SIGINT)  # it says goodbye; one killed is missed after 20 s
             bench.settle()
         finally:

@@ -1,11 +1,11 @@
 """Nodes as lifecycle nodes: inactive ones do nothing, and deactivating shuts the valve."""
 
 import gc
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import waiting
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
@@ -40,10 +40,7 @@ def test_activated_and_deactivated_by_its_services() -> None:
         executor.add_node(node)
 
     def until(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < deadline
-            executor.spin_once(timeout_sec=0.02)
+        waiting.until(condition, lambda: executor.spin_once(timeout_sec=0.02))
 
     def call(kind: type, name: str, request: object) -> object:
         service = client.create_client(kind, f"/force_loop_node/{name}")

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -25,6 +24,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sim_clock import SIM_TIME, SimClock
+from waiting import until
 
 from emir_control.limits import LimitParameters
 from emir_control.prefilter import PrefilterParameters, joint_angle
@@ -136,13 +136,13 @@ class Graph:
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < deadline, f"{what}; {self.listener.said}"
-            self._spin()
-            for node in self.nodes:
-                if isinstance(node, Shell):
-                    node.check()
+        until(condition, self._go_on, lambda: f"{what}; {self.listener.said}")
+
+    def _go_on(self) -> None:
+        self._spin()
+        for node in self.nodes:
+            if isinstance(node, Shell):
+                node.check()
 
     def _spin(self) -> None:
         if self._clock is None:

@@ -1,11 +1,11 @@
 """Nodes in real time on the /clock of a recording: its pace is theirs, and its pauses."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import waiting
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
@@ -56,10 +56,7 @@ def test_a_controller_lives_in_the_recordings_time(executor: SingleThreadedExecu
         executor.add_node(node)
 
     def until(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < deadline
-            executor.spin_once(timeout_sec=0.01)
+        waiting.until(condition, lambda: executor.spin_once(timeout_sec=0.01))
 
     try:
         until(lambda: cascade.count_publishers("/left/cylinder_reference") == 1)

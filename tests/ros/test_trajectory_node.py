@@ -1,7 +1,6 @@
 """trajectory_node's services and waypoints, period by period in lock step."""
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +16,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from waiting import until
 
 from emir_analysis.robot_setup import Posture
 from emir_common.quantity import ParameterError
@@ -78,11 +78,11 @@ class Bench(Node):
 
     def until(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
-        deadline = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < deadline
-            self.spinning.spin_once(timeout_sec=0.01)
-            self.node.check()
+        until(condition, self._go_on)
+
+    def _go_on(self) -> None:
+        self.spinning.spin_once(timeout_sec=0.01)
+        self.node.check()
 
     def run(self, duration: float) -> None:
         """Go on by a duration, s."""

@@ -320,7 +320,7 @@ def _strokes(angle: Array, machine: Machine) -> Array:
     return np.asarray(linkage.strokes(angle, p))
 
 
-def at_rest(experiment: Experiment, machine: Machine) -> int:
+def samples_at_rest(experiment: Experiment, machine: Machine) -> int:
     """Return how many samples come before the first move."""
     moving = np.flatnonzero(np.abs(experiment.commands) > machine.valve.dead_zone)
     return int(moving[0]) // experiment.every

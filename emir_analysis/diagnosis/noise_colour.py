@@ -7,7 +7,7 @@ first-order process (AR(1), Box and Jenkins 1970) of the stated standard deviati
 import numpy as np
 from scipy.signal import detrend, lfilter
 
-from emir_analysis.diagnosis.experiment import Experiment, at_rest, noise
+from emir_analysis.diagnosis.experiment import Experiment, noise, samples_at_rest
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
@@ -25,7 +25,7 @@ def colours(experiment: Experiment, machine: Machine) -> Array:
     machine, as a load that swings, not its sensor.
     """
     stated = noise(machine)
-    columns = experiment.outputs[: at_rest(experiment, machine)].T
+    columns = experiment.outputs[: samples_at_rest(experiment, machine)].T
     return np.array([_colour(column, s) for column, s in zip(columns, stated, strict=True)])
 
 

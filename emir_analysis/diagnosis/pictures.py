@@ -1,19 +1,19 @@
 """The pictures of a diagnosis."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, StrMethodFormatter
 
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve
 from emir_analysis.diagnosis.diagnose import Findings, loudest
+from emir_analysis.diagnosis.drawing import COLOURS, MEASURED, tidy
 from emir_analysis.diagnosis.experiment import OUTPUTS
-from emir_analysis.diagnosis.judged import Judged
+from emir_analysis.diagnosis.judged import STAGES, Judged
 from emir_analysis.diagnosis.swing import Swing, by_swing
 from emir_analysis.report import new_figure
 
-MEASURED, NOMINAL, REFITTED, FINAL = "#1d2733", "#b9c2cb", "#e8963a", "#0b6bb5"
+NOMINAL, REFITTED, FINAL = (COLOURS[stage] for stage in STAGES)
 LOWERING, LIFTING = "#b5460b", "#0b6bb5"
 
 # What a hydraulics engineer reads: label and factor from the SI unit
@@ -76,7 +76,7 @@ def free_runs_picture(findings: Findings, judged: Judged) -> Figure:
         beside.set_yscale("symlog", linthresh=5.0)
         beside.yaxis.set_major_locator(FixedLocator(TIMES_NOISE))
         beside.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        _tidy(signal, beside)
+        tidy(signal, beside)
     # of the figure: beside the left axes it would push the right ones away
     lines, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(lines, names, ncols=4, fontsize=8, loc="outside upper left")
@@ -96,12 +96,12 @@ def balances_picture(findings: Findings) -> Figure:
     for ax, (k, name) in zip(axes, shown, strict=True):
         label, factor = SHOWN[name]
         band = 2.0 * factor * findings.floor[k]
-        ax.axhspan(-band, band, color="#0b6bb5", alpha=0.12, lw=0)
+        ax.axhspan(-band, band, color=FINAL, alpha=0.12, lw=0)
         for stage, (text, colour) in stages.items():
             residual = factor * findings.residuals[stage][:, k]
             ax.plot(findings.evidence.time, residual, color=colour, lw=1.0, label=text)
         ax.set_ylabel(label)
-        _tidy(ax)
+        tidy(ax)
     axes[0].legend(ncols=3, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     axes[-1].set_xlabel("time, s")
     return figure
@@ -127,7 +127,7 @@ def shape_picture(findings: Findings) -> tuple[Figure, str]:
                 values[where], factor * refitted[where, k], ".", ms=3, color=colour, label=moving
             )
         ax.set_xlabel(text)
-        _tidy(ax)
+        tidy(ax)
     axes[0].set_ylabel(f"missing {label}")
     axes[0].legend(fontsize=8, loc="best")
     return figure, name
@@ -150,7 +150,7 @@ def swing_picture(swing: Swing, findings: Findings) -> Figure:
     ax.set_xlabel("time, s")
     ax.set_ylabel(f"missing {label}")
     ax.legend(fontsize=8, loc="best")
-    _tidy(ax)
+    tidy(ax)
     return figure
 
 
@@ -166,7 +166,7 @@ def curve_picture(curve: Curve) -> Figure:
     ax.set_xlabel(text)
     ax.set_ylabel(label)
     ax.legend(fontsize=8, loc="best")
-    _tidy(ax)
+    tidy(ax)
     return figure
 
 
@@ -175,12 +175,3 @@ def _added(findings: Findings) -> str:
     if findings.misstated:
         return f"with another {findings.misstated[0].unknowns.members[-1].path}"
     return findings.chosen.name if findings.curve is None else "with the curve"
-
-
-def _tidy(*axes: Axes) -> None:
-    for ax in axes:
-        ax.grid(color="#dfe4e9", lw=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=8)
-        ax.xaxis.label.set_fontsize(9)
-        ax.yaxis.label.set_fontsize(9)

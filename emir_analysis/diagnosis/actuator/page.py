@@ -2,19 +2,16 @@
 
 from pathlib import Path
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from emir_analysis.diagnosis.actuator.curves import CurveResult
 from emir_analysis.diagnosis.actuator.record import OPENING, PRESSURE, ActuatorRecord
 from emir_analysis.diagnosis.actuator.result import ActuatorDiagnosis
+from emir_analysis.diagnosis.drawing import COLOURS, MEASURED, tidy
 from emir_analysis.diagnosis.page import tests_of_errors
 from emir_analysis.report import Block, Heading, Picture, Table, Text, new_figure, write_html
 from emir_analysis.signals import Array
 
-COLOURS = {"nominal": "#b9c2cb", "refitted": "#e8963a", "black_box": "#7a9e3b",
-           "with_effect": "#0b6bb5"}  # fmt: skip
-MEASURED = "#1d2733"
 SHOWN = 12  # candidates on the page; the JSON has all
 
 
@@ -68,7 +65,7 @@ def _curve(curve: CurveResult) -> list[Block]:
     ax.plot(*zip(*curve.points, strict=True), color=COLOURS["with_effect"], marker="o")
     ax.set_xlabel(curve.over)
     ax.set_ylabel(f"{curve.what} that the model lacks")
-    _plain(ax)
+    tidy(ax)
     return [
         Heading(f"What has no name: a {curve.what} over the {curve.over}"),
         Picture(
@@ -134,11 +131,6 @@ def _parameters(result: ActuatorDiagnosis) -> list[Block]:
     return [Heading("Parameters"), Table(columns, rows)]
 
 
-def _plain(ax: Axes) -> None:
-    ax.grid(color="#dfe4e9", lw=0.6)
-    ax.spines[["top", "right"]].set_visible(False)
-
-
 def _picture(judged: ActuatorRecord, runs: dict[str, Array], result: ActuatorDiagnosis) -> Figure:
     figure = new_figure(7.0)
     time = judged.time - judged.begin
@@ -155,6 +147,5 @@ def _picture(judged: ActuatorRecord, runs: dict[str, Array], result: ActuatorDia
     middle.legend(ncols=5, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     below.set_ylabel("error")
     below.set_xlabel(f"time from the beginning of this recording, {result.time_unit}")
-    for ax in (above, middle, below):
-        _plain(ax)
+    tidy(above, middle, below)
     return figure

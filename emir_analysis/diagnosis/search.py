@@ -273,7 +273,7 @@ class Search:
             return None
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self.floor)
         if set(law.effects) == set(known.effects) and at_noise(known, self._evidence):
-            return None
+            return self.whole.at_noise(fuller)  # a break-away may show in later sticks only
         return self.whole.with_friction(law, fuller, known)
 
     def _excess(self, tried: Trial) -> float:

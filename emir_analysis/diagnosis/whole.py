@@ -58,9 +58,8 @@ class Whole:
         """Return a trial fitted to the free run of the whole recordings."""
         if chosen.effects not in self._known:
             self._progress(f"fitting to the whole recording: {chosen.name}")
-            led = self.led(chosen)
-            fitted = led or refine_free_run(chosen, self._evidence)
-            if led is None and beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
+            fitted = self.led(chosen, AT_NOISE) or refine_free_run(chosen, self._evidence)
+            if beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
                 fitted = self._with_fewer_sizes(fitted)
                 if sticks(fitted):
                     fitted = self._led_again(fitted)
@@ -79,17 +78,18 @@ class Whole:
             del self._known[begun.effects]
         return self.fitted(begun)
 
-    def led(self, chosen: Trial) -> Trial | None:
+    def led(self, chosen: Trial, most: float = LEFT) -> Trial | None:
         """Return a trial that sticks led along a beginning that grows, if it is all that is needed.
 
         Over all of a recording at once a fit takes long, and ends close to where it began.
+        most: that it may leave, in units of the noise.
         """
         if not sticks(chosen) or self._excess(chosen) <= beyond(LEFT):
             return None
         if not follows_the_beginning(chosen, self._evidence):
             return None
         led = self._growths.grown(chosen)
-        return led.trial if led.left <= LEFT else None
+        return led.trial if led.left <= most else None
 
     def _refined_again(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from where it ended, as long as that helps much.
@@ -262,8 +262,17 @@ class Whole:
         """Return the first of fuller laws that is at the noise, where what was found is not."""
         if found.left_of_whole <= AT_NOISE:
             return found
-        all_at_noise = (self._growths.at_noise(more) for more in fuller)
-        return next((led for led in all_at_noise if led is not None), found)
+        led = self._first_at_noise(fuller)
+        return found if led is None else led
+
+    def _first_at_noise(self, laws: list[Trial]) -> Grown | None:
+        all_at_noise = (self._growths.at_noise(law) for law in laws)
+        return next((led for led in all_at_noise if led is not None), None)
+
+    def at_noise(self, laws: list[Trial]) -> Trial | None:
+        """Return the first of laws of friction that is at the noise when it is led to the whole."""
+        led = self._first_at_noise(laws)
+        return None if led is None else led.trial
 
     def _heard(self, led: Trial) -> Trial:
         """Return a trial without viscous friction that has become too small to be heard.

@@ -9,6 +9,7 @@ from operated import operated
 from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import friction_beginning, stick_slip
+from emir_analysis.diagnosis import search as search_module
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, descended
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
@@ -28,8 +29,9 @@ from emir_analysis.diagnosis.friction_laws import (
     nested,
 )
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
-from emir_analysis.diagnosis.run_errors import free_run_errors
-from emir_analysis.diagnosis.select import at_noise
+from emir_analysis.diagnosis.rounds import Tried
+from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
+from emir_analysis.diagnosis.select import AT_NOISE, LEFT, at_noise
 from emir_analysis.diagnosis.stick_slip import Growths
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
@@ -320,6 +322,32 @@ def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:
     assert found.effects == ("stribeck_friction",)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
+
+
+def test_a_break_away_is_looked_for_where_coulomb_s_friction_leaves_a_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Coulomb's, which the beginning tells, is at the noise; what it leaves shows later."""
+    hidden = HIDDEN | {
+        "effects.stribeck_friction.force": 1.15e3,
+        "effects.stribeck_friction.breakaway": 2.0,
+        "effects.stribeck_friction.smoothing_speed": 1e-3,
+        "effects.viscous_friction.coefficient": 0.0,
+    }
+    command = recorded.moves(60.0, seed=3)
+    searched, sheet, evidence = search(
+        {}, lambda _: operated(with_values(joint1(), hidden), command)
+    )
+    start = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
+    coulomb = searched.whole.fitted(fit_free_run(start, evidence))
+    assert LEFT < math.sqrt(mean_square(coulomb, evidence)) < AT_NOISE
+    begins = fit_balances(trial(sheet, ("stribeck_friction",)), evidence, searched.floor)
+    fuller = fit_free_run(begins, evidence)
+    monkeypatch.setattr(search_module, "begun", lambda *_: fuller)
+    monkeypatch.setattr(search_module, "with_less_friction", lambda *_: [coulomb, fuller])
+    _, found = searched._by_beginning([coulomb], Tried(coulomb, 0.0))
+    assert found.trial.effects == ("stribeck_friction",)
+    assert math.sqrt(mean_square(found.trial, evidence)) < LEFT
 
 
 def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:

@@ -155,9 +155,10 @@ def _delayed(signal: Array, dead: float, period: float) -> Array:
     if dead == 0.0:
         return signal
     time = np.arange(signal.size) * period
-    return np.asarray(
-        scipy.interpolate.make_interp_spline(time, signal)(np.maximum(time - dead, 0.0))
-    )
+    shown = np.maximum(time - dead, 0.0)
+    if not np.all(np.isfinite(signal)):  # a run out of all bounds: its beginning stays
+        return np.asarray(np.interp(shown, time, signal))
+    return np.asarray(scipy.interpolate.make_interp_spline(time, signal)(shown))
 
 
 def _lagged(signal: Array, lag: float, period: float) -> Array:

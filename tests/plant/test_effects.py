@@ -877,6 +877,21 @@ def test_a_late_sensor_shows_a_ramp_late_by_its_time(delay: float, dead_share: f
     assert ramp[-1] - by_state == pytest.approx(delay * 1e6)
 
 
+@pytest.mark.parametrize("lost", [math.inf, math.nan])
+@pytest.mark.parametrize("dead_share", [0.0, 0.3, 1.0])
+def test_a_late_sensor_shows_a_run_out_of_all_bounds_up_to_there(
+    dead_share: float, lost: float
+) -> None:
+    """As a fit may try one: what was before stays, and nothing is raised."""
+    plant = _with(sensor_delay={"pressure_lifting": 0.05, "dead_share": dead_share})
+    truth = np.zeros((500, len(Truth._fields)))
+    truth[:, T["pressure_lifting"]] = np.arange(500) * 1e4
+    truth[300:, T["pressure_lifting"]] = lost
+    shown = readings(plant, truth, 1e-2).pressure_lifting
+    assert shown[299] == pytest.approx((299 - 5) * 1e4, rel=1e-3)
+    assert not np.any(np.isfinite(shown[310:]))
+
+
 def test_measuring_with_a_lagging_sensor_needs_the_state() -> None:
     plant = _with(sensor_delay={"angle": 0.05})
     truth = plant.outputs(plant.initial(FORTY_FIVE, 20e5))

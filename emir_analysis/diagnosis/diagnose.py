@@ -8,7 +8,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
 from emir_analysis.diagnosis.curves import Curve, as_far_as_recorded, curve
-from emir_analysis.diagnosis.drift import Drift, drift
+from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, with_spread
@@ -113,9 +113,9 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
     speaking, shape, swings = _shape(evidence, after, loud(after, floor, limit))
     lies = None if speaking is None else _where(evidence, after, floor, speaking)
     instead = doubts.instead
-    if verdict == "unexplained" and instead is None and speaking is not None:
+    if verdict == "unexplained" and instead is None and speaking and not _drifts(named, search):
         instead = _measured(curves, best[0], search, evidence, progress)
-    asked = verdict == "unexplained" and instead is None and bool(np.any(evidence.fitted))
+    asked = verdict == "unexplained" and instead is None
     refitted = final if verdict == "nothing_missing" else search.refitted
     if instead is not None:
         final, after = instead, evidence.residuals([instead.machine])[0]
@@ -139,7 +139,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         where=lies,
         misstated=doubts.misstated,
         curve=None if instead is None or doubts.misstated else _curve(final, evidence),
-        drift=drift(search.balanced, evidence, search.floor) if asked else None,
+        drift=search.drifting if asked else None,
     )
 
 
@@ -203,6 +203,8 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
         return _Doubts(any=True, misstated=tuple(replaced))
     if verdict != "found" or at_noise(named, evidence):
         return _Doubts()
+    if _drifts(named, search):
+        return _Doubts(any=True)
     if sticks(named):
         progress("asking whether its friction differs with the direction")
         if curves.uneven(named):
@@ -212,7 +214,7 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
         instead = curves.measured_instead(named)
         if instead is not None:
             return _Doubts(any=True, curve=instead)
-    return _Doubts(any=_drifts(named, search, evidence))
+    return _Doubts()
 
 
 def _misstated(named: Trial, verdict: str, search: Search, evidence: Evidence) -> list[Trial]:
@@ -227,12 +229,12 @@ def _misstated(named: Trial, verdict: str, search: Search, evidence: Evidence) -
     return search.misstated.better_than(rival)
 
 
-def _drifts(named: Trial, search: Search, evidence: Evidence) -> bool:
+def _drifts(named: Trial, search: Search) -> bool:
     """Tell whether a load that does not bring the free run to the noise may be a size that drifts.
 
     In the balances one that comes slowly is the same as a gauge that drifts.
     """
-    return LOAD in named.effects and drift(search.balanced, evidence, search.floor) is not None
+    return LOAD in named.effects and search.drifting is not None
 
 
 def _measured(

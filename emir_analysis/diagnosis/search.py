@@ -1,13 +1,16 @@
 """Which effects explain the recordings: what is tried, in which order, and what is kept."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
+from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following, refine_free_run
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import Misstated
 from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
@@ -65,6 +68,17 @@ class Search:
         """All trials."""
         return self._rounds.tried
 
+    @cached_property
+    def drifting(self) -> Drift | None:
+        """Return the size that goes from one value to another, if that is most of what is missing.
+
+        None where no balance can be fitted.
+        """
+        if not np.any(self._evidence.fitted):
+            return None
+        self._progress("asking whether something drifts")
+        return drift(self.balanced, self._evidence, self.floor)
+
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
         errors = free_run_errors(self.refitted.machine, self._evidence)
@@ -83,7 +97,7 @@ class Search:
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)
-        if not enough and not self.misstated.better_than(best.trial):
+        if not enough and not (self.misstated.better_than(best.trial) or self.drifting):
             equal = self._two_at_once(plain, best) or equal
         needed = self.needed(equal[0])
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
@@ -131,6 +145,8 @@ class Search:
             many = len(best.trial.effects) >= MOST_BESIDE_ENOUGH
             if enough and (many or self._excess(best.trial) <= beyond(LEFT)):
                 break
+            if not enough and LOAD in best.trial.effects and self.drifting:
+                break  # which comes slowly, as a load does, and no effect beside it explains
         return best, equal, enough
 
     def _two_at_once(self, plain: Tried, best: Tried) -> list[Trial]:

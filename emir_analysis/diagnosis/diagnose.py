@@ -201,20 +201,21 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
     replaced = _misstated(named, "unexplained" if is_spring else verdict, search, evidence)
     if replaced or is_spring:
         return _Doubts(any=True, misstated=tuple(replaced))
-    if verdict != "found" or at_noise(named, evidence):
+    if verdict != "found" or excess(named, evidence) <= beyond(LEFT):
         return _Doubts()
     if _drifts(named, search):
         return _Doubts(any=True)
+    return _Doubts() if at_noise(named, evidence) else _said_better(named, curves, progress)
+
+
+def _said_better(named: Trial, curves: Curves, progress: Progress) -> _Doubts:
+    """Ask whether a curve, or friction that differs with the direction, says what is left."""
     if sticks(named):
         progress("asking whether its friction differs with the direction")
-        if curves.uneven(named):
-            return _Doubts(any=True)
-    else:
-        progress("asking whether a curve says it better")
-        instead = curves.measured_instead(named)
-        if instead is not None:
-            return _Doubts(any=True, curve=instead)
-    return _Doubts()
+        return _Doubts(any=curves.uneven(named))
+    progress("asking whether a curve says it better")
+    instead = curves.measured_instead(named)
+    return _Doubts(any=instead is not None, curve=instead)
 
 
 def _misstated(named: Trial, verdict: str, search: Search, evidence: Evidence) -> list[Trial]:
@@ -230,7 +231,7 @@ def _misstated(named: Trial, verdict: str, search: Search, evidence: Evidence) -
 
 
 def _drifts(named: Trial, search: Search) -> bool:
-    """Tell whether a load that does not bring the free run to the noise may be a size that drifts.
+    """Tell whether a load that leaves something in the free run may be a size that drifts.
 
     In the balances one that comes slowly is the same as a gauge that drifts.
     """

@@ -11,6 +11,7 @@ from emir_analysis.diagnosis.swing import Swing
 from emir_analysis.diagnosis.where import LOCATED, Where
 
 DEFLECTION = "tip_deflection_angle"
+VELOCITY = "piston_velocity"
 FLOWS = frozenset({"lifting_chamber", "lowering_chamber"})
 SHORT = 0.5  # of the recordings: a stretch of time that is named
 
@@ -34,10 +35,12 @@ def remainder(findings: Findings) -> str:
         return keeps
     if findings.drift is not None:
         return f"{keeps}; {_drifting(findings.drift)}"
-    keeps += f"; {_described(shape, findings.swing, lies)}{_when(lies, findings)}"
+    when = _when(lies, findings)
+    keeps += f"; {_described(shape, findings.swing, lies)}{when}"
     by_force = speaking == "force" and FLOWS.isdisjoint(others)  # which no load disturbs
     bent = shape.predictor == DEFLECTION  # as any force at the TCP bends the boom
-    if by_force and (bent or _is_untold(shape, findings.swing, lies)):
+    passes = when and not (shape.by_direction or shape.predictor == VELOCITY)  # as no friction does
+    if by_force and (bent or passes or _is_untold(shape, findings.swing, lies)):
         keeps += (
             "; it may be a load from outside (wind, a push, a load that swings) of another"
             " course over time than those looked for"

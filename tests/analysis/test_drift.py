@@ -7,6 +7,7 @@ import pytest
 import recorded
 from operated import moved, operated
 
+from emir_analysis.diagnosis.diagnose import diagnose
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
@@ -61,3 +62,17 @@ def test_a_valve_whose_null_moves_is_told() -> None:
 )
 def test_what_is_steady_does_not_drift(values: dict[str, float]) -> None:
     assert asked(moved(with_values(joint1(), values), 30.0, seed=6)) is None
+
+
+@pytest.mark.parametrize(("length", "bias"), [(45.0, 1.5e5), (60.0, 3e5)])
+def test_a_drifting_gauge_is_no_load(length: float, bias: float) -> None:
+    """Though one that comes slowly is nearly at the noise; and no pairs are tried in its place."""
+    run, said = moved(joint1(), length, seed=6), []
+    outputs = run.outputs.copy()
+    outputs[:, H] += bias * (1.0 - np.exp(-run.time / 35.0))
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    found = diagnose([replace(run, outputs=outputs)], sheet, said.append)
+    assert found.verdict == "unexplained"
+    assert found.drift is not None
+    assert found.drift.path == "effects.sensor_bias.pressure_lifting"
+    assert not any(line.startswith("pairs") for line in said)

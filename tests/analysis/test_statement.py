@@ -100,6 +100,27 @@ def test_a_bending_that_goes_with_the_missing_force_may_be_a_load() -> None:
         assert ("it may be a load from outside" in remainder(findings)) == load
 
 
+def test_a_force_that_passes_may_be_a_load() -> None:
+    """Whatever signal happens to go with it meanwhile; friction acts whenever the piston moves."""
+    column = list(BALANCES).index("force")
+    findings = SimpleNamespace(
+        speaking="force", verdict="unexplained", swing=None, curve=None, misstated=(), drift=None,
+        residuals={"refitted": np.eye(5)[column] * np.ones((40, 1)) * 9.0},
+        floor=np.ones(5), limit=np.full(5, 2.0),
+        evidence=SimpleNamespace(
+            duration=lambda _: 90.0, place=lambda t: ("a", t), experiments=["a"]
+        ),
+    )  # fmt: skip
+    for end, predictor, load in (
+        (52.0, "valve_command", True),
+        (52.0, "piston_velocity", False),
+        (85.0, "valve_command", False),
+    ):
+        findings.where = Where(22.0, end)
+        findings.shape = SimpleNamespace(predictor=predictor, share=0.8, by_direction=False)
+        assert ("it may be a load from outside" in remainder(findings)) == load
+
+
 @pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])
 def test_what_hardly_helps_does_not_come_closest(
     left: float, *, said: bool, monkeypatch: pytest.MonkeyPatch

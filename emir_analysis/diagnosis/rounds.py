@@ -144,6 +144,25 @@ class Rounds:
         """Tell whether a trial leaves no balance speaking and explains the free run."""
         return self._quiet(tried) and explained(tried, self._evidence)
 
+    def triples(self, best: Tried) -> list[Tried]:
+        """Return what is better than the best so far with an effect more than the best pair.
+
+        That on the balances, if it is clearly better there than one effect: of three that are all
+        needed no two need bring the free run any nearer.
+        """
+        least = {n: self._least(n) for n in (1, 2)}
+        single, pair = least[1], least[2]
+        if single is None or pair is None or pair.balances > single.balances - STRONG:
+            return []
+        self._progress(f"all effects beside: {pair.trial.name}")
+        told = fit_balances(pair.trial, self._head, self._floor)
+        return self._by_balances(self._on_balances(told).singles(), best)
+
+    def _least(self, effects: int) -> Tried | None:
+        """Return the trial with so many effects that leaves least in the balances."""
+        alike = [t for t in self.tried if len(t.trial.effects) == effects]
+        return min(alike, key=lambda t: t.balances, default=None)
+
     def scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         """Return a trial with its scores; free_run: if it is known."""
         return Tried(tried, balance_score(tried, self._evidence, self._floor), free_run)

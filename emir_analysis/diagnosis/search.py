@@ -159,7 +159,7 @@ class Search:
         if others or not np.any(self._evidence.fitted):
             return others
         self._progress("pairs of effects")
-        better = self._rounds.pairs(plain, best)
+        better = self._rounds.pairs(plain, best) or self._rounds.triples(best)
         if not better:
             return []
         equal = _as_good(better)

@@ -380,6 +380,22 @@ def test_three_effects_are_found_together() -> None:
         assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
 
 
+def test_a_third_effect_is_looked_for_where_no_two_bring_the_free_run_nearer() -> None:
+    """Beside the pair that says most to the balances, if that says more than one effect."""
+    hidden = {"effects.payload.mass": 200.0, "effects.internal_leakage.coefficient": 3e-12}
+    searched, sheet, evidence = search(hidden | SHIFT)
+    rounds, known = searched._rounds, {}
+    for effects in ((), ("payload",), ("payload", "valve_null_offset")):
+        fitted_to_balances = fit_balances(trial(sheet, effects), evidence, searched.floor)
+        known[len(effects)] = rounds.scored(fitted_to_balances)
+    rounds.tried = [known[0], known[1]]
+    assert rounds.triples(known[0]) == []
+    rounds.tried.append(known[2])
+    plain = rounds.scored(searched.refitted, free_run_score(searched.refitted, evidence))
+    found = [set(each.trial.effects) for each in rounds.triples(plain)]
+    assert {"payload", "internal_leakage", "valve_null_offset"} in found
+
+
 def test_a_third_effect_is_found_beside_a_pair_that_alone_helps() -> None:
     """The first effect leads nowhere near, and the pair does not suffice."""
     hidden = {

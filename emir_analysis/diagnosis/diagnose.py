@@ -32,9 +32,7 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
-LIKE = (
-    1.5  # times the noise: more, where nothing sticks, and an effect is only like what is missing
-)
+LIKE = 1.5  # times the noise: more, of what does not stick, and an effect is only like the truth
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 
 

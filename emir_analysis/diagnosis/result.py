@@ -18,6 +18,7 @@ from emir_analysis.diagnosis.error_tests import ErrorTests, error_tests
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians
+from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
@@ -296,7 +297,7 @@ def effect_results(
                 low, high, note = value, value, SET
                 if path in undecided:
                     low, high, note = 0.0, 1.0, OPEN
-                elif is_share(path):
+                elif is_share(path) and not sticks(chosen):  # whose other end is hard to fit
                     note = f"{1.0 - value:.0f} explains it worse"
                 parameters[parameter] = ParameterResult(
                     value, about.unit, low, high, (), about.meaning, note

@@ -334,6 +334,33 @@ class PlayOfMagnet(Hidden):
         return super().run(x, times, self._acting)
 
 
+class LaggingCommand(Hidden):
+    """A filter ahead of the spool."""
+
+    name = "command_delay~lag"
+    grows = ("filtered",)
+
+    def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
+        super().__init__(numbers, sizes)
+        self._filter = self.slot()
+        self._given = 0.0
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"filtered": between(random, 0.015, 0.06)}
+
+    def rates(self, x: Array, time: float, command: float) -> Array:
+        self._given = command
+        return super().rates(x, time, float(x[self._filter]))
+
+    def remembered_rates(self, time: float, x: list[float], now: dict[str, float]) -> list[float]:
+        behind = self._given - x[self._filter]
+        return [*super().remembered_rates(time, x, now), behind / self.sizes["filtered"]]
+
+    def start_memory(self, angle: float, x: list[float]) -> list[float]:
+        return [*super().start_memory(angle, x), 0.0]
+
+
 class _OnBristles(Hidden):
     """Seals that give before they slide, as LuGre's bristles do; a state is how far, in 10 um."""
 
@@ -433,6 +460,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     OtherOil,
     SameSlope,
     PlayOfMagnet,
+    LaggingCommand,
     StribeckOnBristles,
     LoadOnBristles,
 )

@@ -233,6 +233,7 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"magnet": 0.04},
         {"width": 0.04, "command_share": 1.0},
     ),
+    _OTHER["command_delay~lag"]: ({"filtered": 0.04}, {"delay": 0.04, "lag_share": 1.0}),
     _OTHER["stribeck_friction~bristles"]: (
         {
             "slides": 1e4,

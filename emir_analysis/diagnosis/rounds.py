@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.candidate import Screened
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
@@ -147,15 +148,16 @@ class Rounds:
     def triples(self, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with an effect more than the best pair.
 
-        That on the balances, if it is clearly better there than one effect: of three that are all
-        needed no two need bring the free run any nearer.
+        That on the balances, if it is clearly better there than one effect and leaves little: of
+        three that are all needed no two need bring the free run any nearer.
         """
-        least = {n: self._least(n) for n in (1, 2)}
-        single, pair = least[1], least[2]
+        single, pair = self._least(1), self._least(2)
         if single is None or pair is None or pair.balances > single.balances - STRONG:
             return []
-        self._progress(f"all effects beside: {pair.trial.name}")
         told = fit_balances(pair.trial, self._head, self._floor)
+        if np.nanmax(level(self._head.residuals([told.machine])[0]) / self._floor) > HOPELESS:
+            return []
+        self._progress(f"all effects beside: {told.name}")
         return self._by_balances(self._on_balances(told).singles(), best)
 
     def _least(self, effects: int) -> Tried | None:

@@ -88,40 +88,32 @@ def test_a_recording_far_off_may_be_another_machine_s(
     assert said.endswith("diagnose from that too")
 
 
-def test_a_bending_that_goes_with_the_missing_force_may_be_a_load() -> None:
-    """As any force at the TCP bends the boom; a force by the velocity is none."""
+@pytest.mark.parametrize(
+    ("begin", "end", "predictor", "load"),
+    [
+        (0.0, 90.0, "tip_deflection_angle", True),
+        (0.0, 90.0, "piston_velocity", False),
+        (22.0, 52.0, "valve_command", True),
+        (22.0, 52.0, "piston_velocity", False),
+        (22.0, 85.0, "valve_command", False),
+    ],
+)
+def test_a_force_that_bends_the_boom_or_passes_may_be_a_load(
+    begin: float, end: float, predictor: str, *, load: bool
+) -> None:
+    """As any force at the TCP bends it; friction acts whenever the piston moves."""
     column = list(BALANCES).index("force")
     findings = SimpleNamespace(
         speaking="force", verdict="unexplained", swing=None, curve=None, misstated=(), drift=None,
         residuals={"refitted": np.eye(5)[column] * np.ones((40, 1)) * 9.0},
         floor=np.ones(5), limit=np.full(5, 2.0),
-        where=Where(0.0, 90.0),
-        evidence=SimpleNamespace(duration=lambda _: 90.0, place=lambda t: ("a", t)),
-    )  # fmt: skip
-    for predictor, load in (("tip_deflection_angle", True), ("piston_velocity", False)):
-        findings.shape = SimpleNamespace(predictor=predictor, share=0.8, by_direction=False)
-        assert ("it may be a load from outside" in remainder(findings)) == load
-
-
-def test_a_force_that_passes_may_be_a_load() -> None:
-    """Whatever signal happens to go with it meanwhile; friction acts whenever the piston moves."""
-    column = list(BALANCES).index("force")
-    findings = SimpleNamespace(
-        speaking="force", verdict="unexplained", swing=None, curve=None, misstated=(), drift=None,
-        residuals={"refitted": np.eye(5)[column] * np.ones((40, 1)) * 9.0},
-        floor=np.ones(5), limit=np.full(5, 2.0),
+        where=Where(begin, end),
+        shape=SimpleNamespace(predictor=predictor, share=0.8, by_direction=False),
         evidence=SimpleNamespace(
             duration=lambda _: 90.0, place=lambda t: ("a", t), experiments=["a"]
         ),
     )  # fmt: skip
-    for end, predictor, load in (
-        (52.0, "valve_command", True),
-        (52.0, "piston_velocity", False),
-        (85.0, "valve_command", False),
-    ):
-        findings.where = Where(22.0, end)
-        findings.shape = SimpleNamespace(predictor=predictor, share=0.8, by_direction=False)
-        assert ("it may be a load from outside" in remainder(findings)) == load
+    assert ("it may be a load from outside" in remainder(findings)) == load
 
 
 @pytest.mark.parametrize(

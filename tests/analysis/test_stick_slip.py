@@ -10,6 +10,7 @@ from test_diagnosis_search import TOLERANCES, search
 
 from emir_analysis.diagnosis import friction_beginning, stick_slip
 from emir_analysis.diagnosis import search as search_module
+from emir_analysis.diagnosis import whole as whole_module
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, descended
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
@@ -32,7 +33,7 @@ from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT, at_noise
-from emir_analysis.diagnosis.stick_slip import Growths
+from emir_analysis.diagnosis.stick_slip import Grown, Growths
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -322,6 +323,25 @@ def test_a_break_away_is_found_that_the_beginning_hardly_shows() -> None:
     assert found.effects == ("stribeck_friction",)
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
+
+
+@pytest.mark.parametrize(("left", "over_all"), [(1.05, 0), (1.2, 1)])
+def test_what_is_led_to_the_noise_is_not_fitted_over_all_at_once(
+    monkeypatch: pytest.MonkeyPatch, left: float, over_all: int
+) -> None:
+    searched, sheet, evidence = search(HIDDEN)
+    known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
+    fitted: list[Trial] = []
+
+    def refine(known: Trial, *_: object) -> Trial:
+        fitted.append(known)
+        return known
+
+    monkeypatch.setattr(whole_module, "follows_the_beginning", lambda *_: True)
+    monkeypatch.setattr(whole_module, "refine_free_run", refine)
+    monkeypatch.setattr(Growths, "grown", lambda *_: Grown(known, left, given_up=False))
+    searched.whole.fitted(known)
+    assert len(fitted) == over_all
 
 
 def test_a_break_away_is_looked_for_where_coulomb_s_friction_leaves_a_little(

@@ -213,22 +213,43 @@ class Search:
             return chosen
         full = self.whole.fitted(chosen)
         least = self.whole.score(full) + STRONG
-        enough = []
+        found = []
         for effect in chosen.effects:
             if effect in self._settled or self._hopeless_without(full, effect):
                 continue
-            fewer = full.without(effect)
-            if not fewer.effects and self._excess(self.refitted) > beyond(EXPLAINED):
+            if full.effects == (effect,) and self._excess(self.refitted) > beyond(EXPLAINED):
                 continue
             self._progress(f"fitting without: {effect}")
-            fitted = self.whole.better(refine_free_run(fewer, self._evidence, full))
-            if self.whole.score(fitted) < least and self._rounds.enough(fitted):
-                enough.append(fitted)
+            fewer = refine_free_run(full.without(effect), self._evidence, full)
+            found.append(self.whole.better(fewer))
+        enough = self._as_good_as(found, least) or self._as_good_as(self._anew(found, full), least)
         if not enough:
             return chosen
         best = min(enough, key=self.whole.score)
         self.whole.keep(best)
         return self.needed(best)
+
+    def _as_good_as(self, fitted: list[Trial], least: float) -> list[Trial]:
+        """Return those that explain enough and whose score of the whole is below least."""
+        return [t for t in fitted if self.whole.score(t) < least and self._rounds.enough(t)]
+
+    def _anew(self, behind: list[Trial], full: Trial) -> list[Trial]:
+        """Return trials that are behind a fuller one fitted anew beside parameters alone.
+
+        What is not needed may have led the others astray: a play that stands for a dead zone leads
+        a late command to a lag. Single effects were all begun there.
+        """
+        found = []
+        for fewer in behind:
+            near = self._excess(fewer) < beyond(HOPELESS)
+            if near and len(fewer.effects) > 1 and not sticks(fewer):
+                self._progress(f"fitting anew: {fewer.name}")
+                begun = trial(self._sheet, fewer.effects, self.refitted)
+                if np.any(self._evidence.fitted):
+                    begun = fit_balances(begun, self._evidence, self.floor)
+                begun = fit_free_run(begun, self._evidence)
+                found.append(refine_free_run(begun, self._evidence, full))
+        return found
 
     def _hopeless_without(self, full: Trial, effect: str) -> bool:
         """Tell whether a trial is so far off without one of its effects that no fit is worthwhile.

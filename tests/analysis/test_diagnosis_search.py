@@ -456,6 +456,25 @@ def test_an_effect_that_is_not_needed_is_dropped() -> None:
     assert not any("valve_null_offset" in u.path for u in kept.unknowns.members)
 
 
+def test_what_an_effect_that_is_not_needed_led_astray_is_fitted_anew() -> None:
+    """A late command beside a dead zone, led to a lag and a slow spool where play helps them."""
+    late = {"effects.command_delay.delay": 0.015, "effects.valve_dead_zone_error.error": 0.012}
+    rng, pulses = np.random.default_rng(3), [np.zeros(40)]
+    for opening, sign in zip(rng.uniform(0.2, 0.55, 40), rng.choice([-1.0, 1.0], 40), strict=True):
+        pulses += [np.repeat([sign * opening, 0.0], rng.integers((10, 10), (44, 28)))]
+    inches = np.convolve(np.concatenate(pulses), np.ones(4) / 4.0, "same")
+    stated, spool = joint1(), "valve.natural_frequency"
+    evidence = Evidence([operated(with_values(stated, late), inches)], stated)
+    sheet = Sheet(stated, TOLERANCES | {spool: 0.1}, {}, ())
+    astray = trial(sheet, ("valve_hysteresis", "command_delay", "valve_dead_zone_error"))
+    astray = astray.fixed("effects.command_delay.lag_share", 1.0)
+    searched = Search(evidence, sheet, lambda _: None)
+    kept = searched.needed(refine_free_run(astray, evidence))
+    assert set(kept.effects) == {"command_delay", "valve_dead_zone_error"}
+    assert kept.machine.effects.command_delay.delay == pytest.approx(0.015, rel=0.03)
+    assert kept.machine.effects.command_delay.lag_share == pytest.approx(0.0, abs=0.15)
+
+
 def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")

@@ -5,9 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
+from emir_analysis.diagnosis.backward_elimination import BackwardElimination
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following, refine_free_run
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.loads import LOAD
@@ -16,7 +17,6 @@ from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
-    EXPLAINED,
     HOPELESS,
     LEFT,
     SEEN,
@@ -46,7 +46,7 @@ class Search:
     without which the whole is explained as well.
 
     balanced, refitted: the parameters alone, fitted to the balances and to the whole free run.
-    misstated: what one value of the sheet explains, if it is another.
+    misstated: what one value of the sheet explains, if it is another. elimination: of effects.
     """
 
     def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
@@ -59,8 +59,8 @@ class Search:
         self.whole = Whole(evidence, sheet, self.floor, progress)
         self.misstated = Misstated(self.balanced, evidence, self.floor, progress)
         self._rounds = Rounds(evidence, sheet, self.floor, self.whole, progress)
+        self.elimination = BackwardElimination(evidence, sheet, self.whole, self._rounds, progress)
         self._equal: dict[tuple[str, ...], list[Trial]] = {}  # the best of each round, by effects
-        self._settled: tuple[str, ...] = ()  # effects that are known to be needed
         self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
 
     @property
@@ -99,7 +99,7 @@ class Search:
             enough = self._rounds.enough(best.trial)
         if not enough and not (self.misstated.better_than(best.trial) or self.drifting):
             equal = self._two_at_once(plain, best) or equal
-        needed = self.needed(equal[0])
+        needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
         return equal if needed is equal[0] else self._equal.get(needed.effects, [needed])
@@ -207,59 +207,6 @@ class Search:
                     best, equal = other, [other]
         return equal
 
-    def needed(self, chosen: Trial) -> Trial:
-        """Return a trial without the effect that is least needed, if one is not."""
-        if not chosen.effects or not self._rounds.enough(self.whole.fitted(chosen)):
-            return chosen
-        full = self.whole.fitted(chosen)
-        least = self.whole.score(full) + STRONG
-        found = []
-        for effect in chosen.effects:
-            if effect in self._settled or self._hopeless_without(full, effect):
-                continue
-            if full.effects == (effect,) and self._excess(self.refitted) > beyond(EXPLAINED):
-                continue
-            self._progress(f"fitting without: {effect}")
-            fewer = refine_free_run(full.without(effect), self._evidence, full)
-            found.append(self.whole.better(fewer))
-        enough = self._as_good_as(found, least) or self._as_good_as(self._anew(found, full), least)
-        if not enough:
-            return chosen
-        best = min(enough, key=self.whole.score)
-        self.whole.keep(best)
-        return self.needed(best)
-
-    def _as_good_as(self, fitted: list[Trial], least: float) -> list[Trial]:
-        """Return those that explain enough and whose score of the whole is below least."""
-        return [t for t in fitted if self.whole.score(t) < least and self._rounds.enough(t)]
-
-    def _anew(self, behind: list[Trial], full: Trial) -> list[Trial]:
-        """Return trials that are behind a fuller one fitted anew beside parameters alone.
-
-        What is not needed may have led the others astray: a play that stands for a dead zone leads
-        a late command to a lag. Single effects were all begun there.
-        """
-        found = []
-        for fewer in behind:
-            near = self._excess(fewer) < beyond(HOPELESS)
-            if near and len(fewer.effects) > 1 and not sticks(fewer):
-                self._progress(f"fitting anew: {fewer.name}")
-                begun = trial(self._sheet, fewer.effects, self.refitted)
-                if np.any(self._evidence.fitted):
-                    begun = fit_balances(begun, self._evidence, self.floor)
-                begun = fit_free_run(begun, self._evidence)
-                found.append(refine_free_run(begun, self._evidence, full))
-        return found
-
-    def _hopeless_without(self, full: Trial, effect: str) -> bool:
-        """Tell whether a trial is so far off without one of its effects that no fit is worthwhile.
-
-        To first order, so only where that is far more than what has to be left: beyond it, what
-        else is fitted may do better than along straight lines.
-        """
-        count = sum(error.size for error in free_run_errors(full.machine, self._evidence))
-        return full.cost_without(effect) > beyond(HOPELESS) * count
-
     def _known_whole(self, best: Tried) -> Tried:
         """Return a trial as the whole recordings have it, if it is near them.
 
@@ -290,7 +237,7 @@ class Search:
         if found is None or self.whole.score(found) > self.whole.score(best.trial) - STRONG:
             return equal, best
         self.whole.keep(found)
-        self._settled = tuple(name for name in found.effects if name.endswith("_friction"))
+        self.elimination.settled = tuple(n for n in found.effects if n.endswith("_friction"))
         told = self._rounds.scored(found, free_run_score(found, self._evidence))
         self._rounds.tried.append(told)
         return [found], told

@@ -69,6 +69,11 @@ def search(
     return Search(evidence, sheet, lambda _: None), sheet, evidence
 
 
+def needed(searched: Search, chosen: Trial) -> Trial:
+    """Return a trial without the effects that are not needed."""
+    return searched.elimination.needed(chosen, searched.refitted)
+
+
 def fitted(begun: tuple[Search, Sheet, Evidence], *effects: str) -> Trial:
     """Return a trial with the effects, fitted."""
     searched, sheet, evidence = begun
@@ -450,7 +455,7 @@ def test_what_noise_makes_of_a_short_recording_does_not_speak() -> None:
 def test_an_effect_that_is_not_needed_is_dropped() -> None:
     begun = search(FRICTION)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")
-    kept = begun[0].needed(pair)
+    kept = needed(begun[0], pair)
     assert kept.effects == ("viscous_friction",)
     assert kept.machine.effects.viscous_friction.coefficient == pytest.approx(1e5, rel=0.02)
     assert not any("valve_null_offset" in u.path for u in kept.unknowns.members)
@@ -469,7 +474,7 @@ def test_what_an_effect_that_is_not_needed_led_astray_is_fitted_anew() -> None:
     astray = trial(sheet, ("valve_hysteresis", "command_delay", "valve_dead_zone_error"))
     astray = astray.fixed("effects.command_delay.lag_share", 1.0)
     searched = Search(evidence, sheet, lambda _: None)
-    kept = searched.needed(refine_free_run(astray, evidence))
+    kept = needed(searched, refine_free_run(astray, evidence))
     assert set(kept.effects) == {"command_delay", "valve_dead_zone_error"}
     assert kept.machine.effects.command_delay.delay == pytest.approx(0.015, rel=0.03)
     assert kept.machine.effects.command_delay.lag_share == pytest.approx(0.0, abs=0.15)
@@ -478,7 +483,7 @@ def test_what_an_effect_that_is_not_needed_led_astray_is_fitted_anew() -> None:
 def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")
-    assert begun[0].needed(pair).effects == pair.effects
+    assert needed(begun[0], pair).effects == pair.effects
 
 
 @pytest.mark.parametrize(
@@ -644,7 +649,7 @@ def test_what_is_fixed_no_longer_widens_what_is_left() -> None:
 
 def test_a_healthy_machine_keeps_no_effect() -> None:
     begun = search({})
-    assert begun[0].needed(fitted(begun, "viscous_friction")).effects == ()
+    assert needed(begun[0], fitted(begun, "viscous_friction")).effects == ()
 
 
 def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_away() -> None:

@@ -79,7 +79,7 @@ class Rounds:
         """
         better = []
         if np.any(self._evidence.fitted):
-            found = self._on_balances(best.trial).singles()
+            found = self._on_balances(best.trial).singles
             better = self._by_balances(found, best)
             near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
             told = near or self._evidence.complete
@@ -127,18 +127,26 @@ class Rounds:
         self.tried += found
         return found
 
+    def far_better_pairs(self, plain: Tried, best: Tried) -> list[Tried]:
+        """Return what is better than the best so far of two effects that leave far less than one.
+
+        In the balances, beside parameters alone. An effect that leaves much stands for others, and
+        leads those astray that are looked for beside it.
+        """
+        return self._by_balances(self._on_balances(plain.trial).far_better_pairs, best)
+
     def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with two effects beside parameters alone.
 
         All to first order, and all beside the one effect that says most to the balances: the
         free run may be none the better for it while another effect drives it away.
         """
-        found = self._on_balances(plain.trial).pairs()
+        found = list(self._on_balances(plain.trial).pairs)
         singles = [t for t in self.tried if len(t.trial.effects) == 1]
         first = min(singles, key=lambda t: t.balances, default=best)
         if first.trial.effects != best.trial.effects:
             told = fit_balances(first.trial, self._head, self._floor)
-            found += self._on_balances(told).singles()
+            found += self._on_balances(told).singles
         return self._by_balances(sorted(found, key=lambda s: s.cost), best)
 
     def enough(self, tried: Trial) -> bool:
@@ -158,7 +166,7 @@ class Rounds:
         if np.nanmax(level(self._head.residuals([told.machine])[0]) / self._floor) > HOPELESS:
             return []
         self._progress(f"all effects beside: {told.name}")
-        return self._by_balances(self._on_balances(told).singles(), best)
+        return self._by_balances(self._on_balances(told).singles, best)
 
     def _least(self, effects: int) -> Tried | None:
         """Return the trial with so many effects that leaves least in the balances."""

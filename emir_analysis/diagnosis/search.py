@@ -132,8 +132,7 @@ class Search:
         enough = False
         self._equal[best.trial.effects] = equal
         while len(best.trial.effects) < MOST_EFFECTS:
-            self._progress(f"all effects beside: {best.trial.name}")
-            better = self._rounds.beside_enough(best) if enough else self._rounds.beside(best)
+            better = self._with_one_more(best, enough=enough)
             if not better:
                 break
             equal = self.simplest(_as_good(better), better)
@@ -148,6 +147,33 @@ class Search:
             if not enough and LOAD in best.trial.effects and self.drifting:
                 break  # which comes slowly, as a load does, and no effect beside it explains
         return best, equal, enough
+
+    def _with_one_more(self, best: Tried, *, enough: bool) -> list[Tried]:
+        """Return what is better with an effect more; with two, where the first leaves much.
+
+        enough: the best so far suffices.
+        """
+        self._progress(f"all effects beside: {best.trial.name}")
+        if enough:
+            return self._rounds.beside_enough(best)
+        better = self._rounds.beside(best)
+        if best.trial.effects or not better:
+            return better
+        return self._far_better_pairs(best, min(better, key=free)) or better
+
+    def _far_better_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
+        """Return the pairs of effects that are better than a single one that leaves much.
+
+        What sticks is told by a beginning, not by the balances. What drifts comes slowly, as a load
+        does.
+        """
+        told = self._evidence.complete and not sticks(single.trial)
+        if not told or leaves_quiet(single.trial, self._evidence):
+            return []
+        if LOAD in single.trial.effects and self.drifting:
+            return []
+        self._progress("pairs of effects that leave far less than one")
+        return self._rounds.far_better_pairs(plain, single)
 
     def _two_at_once(self, plain: Tried, best: Tried) -> list[Trial]:
         """Return the best trials beside another first effect, or else of pairs, if there are any.

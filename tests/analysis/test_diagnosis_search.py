@@ -250,7 +250,7 @@ def test_a_load_that_swings_about_a_mean_from_before_the_start_is_begun_so() -> 
         {f"effects.external_load.{name}": value for name, value in sizes.items()}
     )
     plain = fit_balances(trial(sheet, ()), evidence, searched.floor)
-    best = OnBalances(plain, sheet, evidence, searched.floor).singles()[0].trial
+    best = OnBalances(plain, sheet, evidence, searched.floor).singles[0].trial
     assert best.effects == ("external_load",)
     best = fit_balances(best, evidence, searched.floor)
     load = best.machine.effects.external_load

@@ -125,7 +125,7 @@ def test_an_effect_that_shows_only_when_it_is_large_is_seen(size: float) -> None
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    first = OnBalances(plain, sheet, evidence, floor).singles()[0].trial
+    first = OnBalances(plain, sheet, evidence, floor).singles[0].trial
     assert first.name == "supply_pressure_droop"
     found = first.machine.effects.supply_pressure_droop.resistance
     assert found == pytest.approx(resistance, rel=0.1)
@@ -143,7 +143,7 @@ def test_one_of_several_sizes_is_seen_where_another_hides_it(off: float) -> None
     floor = evidence.floor(stated)
     sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    first = OnBalances(plain, sheet, evidence, floor).singles()[0].trial
+    first = OnBalances(plain, sheet, evidence, floor).singles[0].trial
     assert first.name == "logic_block_fault"
     assert first.machine.effects.logic_block_fault.threshold == pytest.approx(off, rel=0.05)
 
@@ -160,8 +160,8 @@ def test_an_effect_is_not_promised_parameters_beyond_their_tolerances() -> None:
     tolerances = {"cylinder.beta": 0.15, "cylinder.volume_lifting_0": 0.1}
     sheet = Sheet(stated, tolerances, {}, ())
     plain = fit_balances(trial(sheet, ()), evidence, floor)
-    assert OnBalances(plain, sheet, evidence, floor).singles()[0].trial.name == "vessel_compliance"
-    first = OnBalances(plain, sheet, evidence, floor).pairs()[0].trial
+    assert OnBalances(plain, sheet, evidence, floor).singles[0].trial.name == "vessel_compliance"
+    first = OnBalances(plain, sheet, evidence, floor).pairs[0].trial
     assert set(first.effects) == {"entrained_air", "vessel_compliance"}
 
 

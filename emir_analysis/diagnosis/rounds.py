@@ -127,13 +127,15 @@ class Rounds:
         self.tried += found
         return found
 
-    def far_better_pairs(self, plain: Tried, best: Tried) -> list[Tried]:
-        """Return what is better than the best so far of two effects that leave far less than one.
+    def quiet_pairs(self, plain: Tried, best: Tried) -> list[Tried]:
+        """Return what is better than the best so far of two effects that leave no balance speaking.
 
-        In the balances, beside parameters alone. An effect that leaves much stands for others, and
-        leads those astray that are looked for beside it.
+        Beside parameters alone. An effect that leaves much stands for others, and leads those
+        astray that are looked for beside it.
         """
-        return self._by_balances(self._on_balances(plain.trial).far_better_pairs, best)
+        pairs = self._fitted_to_balances(self._on_balances(plain.trial).pairs)
+        quiet = [pair for pair in pairs if self._quiet(pair.trial)]
+        return self._better_on_balances(quiet, best) if quiet else []
 
     def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with two effects beside parameters alone.
@@ -240,17 +242,24 @@ class Rounds:
         return min(begun, balanced, key=lambda t: excess(t, self._head))
 
     def _by_balances(self, found: list[Screened], best: Tried) -> list[Tried]:
-        """Fit trials to the balances, those that come close to the best of them to the free run.
+        """Fit trials to the balances and return what is better; see `_better_on_balances`."""
+        return self._better_on_balances(self._fitted_to_balances(found), best)
 
-        Return what is better. Where none is, the one that is ahead in the free run already.
-        """
+    def _fitted_to_balances(self, found: list[Screened]) -> list[Tried]:
+        """Return the first trials that were not tried yet, fitted to the balances."""
         known = {frozenset(tried.trial.effects) for tried in self.tried}
         new = []
         for screened in found:
             if frozenset(screened.trial.effects) not in known:
                 known.add(frozenset(screened.trial.effects))
                 new.append(screened.trial)
-        round_ = side_by_side(self._on_its_balances, new[:MOST_FITTED])
+        return side_by_side(self._on_its_balances, new[:MOST_FITTED])
+
+    def _better_on_balances(self, round_: list[Tried], best: Tried) -> list[Tried]:
+        """Fit trials that come close to the best of a round on the balances to the free run.
+
+        Return what is better. Where none is, the one that is ahead in the free run already.
+        """
         least = min((t.balances for t in round_), default=np.inf)
         limit = min(best.balances - STRONG, least + CLOSE)
         close = sorted((t for t in round_ if t.balances <= limit), key=lambda t: t.balances)

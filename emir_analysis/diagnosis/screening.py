@@ -13,7 +13,6 @@ from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.candidate import (
     AT_TIP,
     SMALL,
-    SOFT_NOISE,
     Candidate,
     Left,
     Screened,
@@ -35,7 +34,6 @@ from emir_plant.sheet import Sheet
 MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
 NEAR_BEST = 2.0  # times the least cost: what leaves more does not come to it by other shares
-FAR_BETTER = 0.3  # share of what one effect leaves above the noise that two leave at most
 SILENT = 0.5  # cost of a residual, of which noise makes 0.35: nothing is left to be explained
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
@@ -83,13 +81,6 @@ class OnBalances:
             start = trial(self._sheet, (*known.effects, one.effect, other.effect), known)
             together.append(Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
         return sorted(side_by_side(Candidate.fitted, together), key=lambda s: s.cost)
-
-    @property
-    def far_better_pairs(self) -> list[Screened]:
-        """Those pairs that leave far less above the noise than any one effect, the best first."""
-        noise = SOFT_NOISE * self._left.nothing.size
-        most = noise + FAR_BETTER * (self.singles[0].cost - noise)
-        return [pair for pair in self.pairs if pair.cost <= most]
 
 
 def screen_free_run(

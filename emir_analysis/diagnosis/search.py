@@ -159,9 +159,9 @@ class Search:
         better = self._rounds.beside(best)
         if best.trial.effects or not better:
             return better
-        return self._far_better_pairs(best, min(better, key=free)) or better
+        return self._quiet_pairs(best, min(better, key=free)) or better
 
-    def _far_better_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
+    def _quiet_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
         """Return the pairs of effects that are better than a single one that leaves much.
 
         What sticks is told by a beginning, not by the balances. What drifts comes slowly, as a load
@@ -172,8 +172,8 @@ class Search:
             return []
         if LOAD in single.trial.effects and self.drifting:
             return []
-        self._progress("pairs of effects that leave far less than one")
-        return self._rounds.far_better_pairs(plain, single)
+        self._progress("pairs of effects that leave the balances quiet")
+        return self._rounds.quiet_pairs(plain, single)
 
     def _two_at_once(self, plain: Tried, best: Tried) -> list[Trial]:
         """Return the best trials beside another first effect, or else of pairs, if there are any.

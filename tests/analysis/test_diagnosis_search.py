@@ -385,6 +385,20 @@ def test_three_effects_are_found_together() -> None:
         assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
 
 
+def test_two_effects_for_which_a_third_stands_are_asked_about_first() -> None:
+    """A gauge that shows too much is nearest to a payload beside a bias, and leaves some of it."""
+    hidden = {"effects.payload.mass": 30.0, "effects.sensor_bias.pressure_lifting": 1e5}
+    stated, told = joint1(), []
+    evidence = Evidence([moved(with_values(stated, hidden))], stated)
+    searched = Search(evidence, Sheet(stated, TOLERANCES, {}, ()), told.append)
+    found = searched.whole.fitted(searched.run()[0])
+    assert set(found.effects) == {"payload", "sensor_bias"}
+    for path, value in hidden.items():
+        assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
+    rounds = [line for line in told if line.startswith("all effects beside")]
+    assert rounds == ["all effects beside: parameters only"]
+
+
 def test_a_third_effect_is_looked_for_where_no_two_bring_the_free_run_nearer() -> None:
     """Beside the pair that says most to the balances, if that says more than one effect."""
     hidden = {"effects.payload.mass": 200.0, "effects.internal_leakage.coefficient": 3e-12}

@@ -131,11 +131,15 @@ class Rounds:
         """Return what is better than the best so far of two effects that leave no balance speaking.
 
         Beside parameters alone. An effect that leaves much stands for others, and leads those
-        astray that are looked for beside it.
+        astray that are looked for beside it. Pairs that are no better may be so from there.
         """
         pairs = self._fitted_to_balances(self._on_balances(plain.trial).pairs)
         quiet = [pair for pair in pairs if self._quiet(pair.trial)]
-        return self._better_on_balances(quiet, best) if quiet else []
+        before = list(self.tried)
+        better = self._better_on_balances(quiet, best) if quiet else []
+        if not better:
+            self.tried = before
+        return better
 
     def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with two effects beside parameters alone.

@@ -159,7 +159,11 @@ class Search:
         better = self._rounds.beside(best)
         if best.trial.effects or not better:
             return better
-        return self._quiet_pairs(best, min(better, key=free)) or better
+        pairs = self._quiet_pairs(best, min(better, key=free))
+        if pairs:  # one of two may still not be needed
+            singles = _as_good(better)
+            self._equal[singles[0].effects] = singles
+        return pairs or better
 
     def _quiet_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
         """Return the pairs of effects that are better than a single one that leaves much.

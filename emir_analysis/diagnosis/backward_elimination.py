@@ -4,7 +4,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, refine_free_run
-from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.friction_laws import COULOMB, STRIBECK, sticks
 from emir_analysis.diagnosis.rounds import Rounds
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import EXPLAINED, HOPELESS, STRONG, beyond, excess
@@ -48,7 +48,9 @@ class BackwardElimination:
 
     def _may_go(self, effect: str, full: Trial, plain: Trial) -> bool:
         """Tell whether a fit without one of its effects may be enough."""
-        if effect in self.settled or self._hopeless_without(effect, full):
+        if effect in self.settled and not (effect == COULOMB and STRIBECK in full.effects):
+            return False  # but Coulomb's friction is in Stribeck's
+        if self._hopeless_without(effect, full):
             return False
         return full.effects != (effect,) or self._excess(plain) <= beyond(EXPLAINED)
 

@@ -494,6 +494,18 @@ def test_what_an_effect_that_is_not_needed_led_astray_is_fitted_anew() -> None:
     assert kept.machine.effects.command_delay.lag_share == pytest.approx(0.0, abs=0.15)
 
 
+def test_friction_that_a_beginning_told_goes_where_a_fuller_law_has_it() -> None:
+    """Coulomb's beside Stribeck's, which is Coulomb's with a break-away."""
+    law = {"force": 4e3, "breakaway": 2.5, "stribeck_speed": 0.02, "smoothing_speed": 1e-3}
+    hidden = {f"effects.stribeck_friction.{name}": value for name, value in law.items()}
+    searched, sheet, _ = search(hidden)
+    both = trial(sheet, ("coulomb_friction", "stribeck_friction"))
+    values = both.unknowns.values(both.x) | hidden | {"effects.coulomb_friction.force": 50.0}
+    both = both.at(np.array([u.at(values[u.path]) for u in both.unknowns.members]))
+    searched.elimination.settled = ("coulomb_friction",)
+    assert needed(searched, both).effects == ("stribeck_friction",)
+
+
 def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")

@@ -168,13 +168,10 @@ class Search:
     def _quiet_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
         """Return the pairs of effects that are better than a single one that leaves much.
 
-        What sticks is told by a beginning, not by the balances. What drifts comes slowly, as a load
-        does.
+        What sticks is told by a beginning, not by the balances; a size that drifts is no pair.
         """
         told = self._evidence.complete and not sticks(single.trial)
-        if not told or leaves_quiet(single.trial, self._evidence):
-            return []
-        if LOAD in single.trial.effects and self.drifting:
+        if not told or leaves_quiet(single.trial, self._evidence) or self.drifting:
             return []
         self._progress("pairs of effects that leave the balances quiet")
         return self._rounds.quiet_pairs(plain, single)

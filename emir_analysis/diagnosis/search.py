@@ -102,7 +102,24 @@ class Search:
         needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
-        return equal if needed is equal[0] else self._equal.get(needed.effects, [needed])
+        if needed is not equal[0]:
+            equal = self._equal.get(needed.effects, [needed])
+        return self._rivals_on_the_whole(equal)
+
+    def _rivals_on_the_whole(self, equal: list[Trial]) -> list[Trial]:
+        """Return the best trial and those that are as good on the whole, too.
+
+        The part held back may be too short to part them. What sticks may be led to the whole badly.
+        """
+        best, *others = equal
+        if not others or not best.effects:
+            return equal
+        limit = self._on_the_whole(best) + STRONG
+        as_good = [t for t in others if sticks(t) or self._on_the_whole(t) < limit]
+        return [best, *as_good]
+
+    def _on_the_whole(self, one: Trial) -> float:
+        return self.whole.score(self.whole.fitted(one))
 
     def _by_whole(self, known: Trial) -> list[Trial]:
         """Return the best trials with one effect more that the whole alone tells, if there are any.
@@ -228,10 +245,9 @@ class Search:
         best = equal[0]
         for other in (t.trial for t in better):
             fewer = other.x.size < best.x.size and not sticks(other)
-            if fewer and at_noise(best, self._head) and at_noise(other, self._head):
-                limit = self.whole.score(self.whole.fitted(best)) + STRONG
-                if self.whole.score(self.whole.fitted(other)) < limit:
-                    best, equal = other, [other]
+            explain = fewer and at_noise(best, self._head) and at_noise(other, self._head)
+            if explain and self._on_the_whole(other) < self._on_the_whole(best) + STRONG:
+                best, equal = other, [other]
         return equal
 
     def _known_whole(self, best: Tried) -> Tried:

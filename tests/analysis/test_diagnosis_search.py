@@ -506,6 +506,14 @@ def test_friction_that_a_beginning_told_goes_where_a_fuller_law_has_it() -> None
     assert needed(searched, both).effects == ("stribeck_friction",)
 
 
+def test_a_rival_is_as_good_on_the_whole() -> None:
+    """Another effect is far worse there; one with a size that is none is as good."""
+    begun = search(FRICTION)
+    right, wrong = fitted(begun, "viscous_friction"), fitted(begun, "payload")
+    more = fitted(begun, "viscous_friction", "valve_null_offset")
+    assert begun[0]._rivals_on_the_whole([right, wrong, more]) == [right, more]
+
+
 def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")

@@ -228,20 +228,20 @@ def with_less_friction(known: Trial, evidence: Evidence, sheet: Sheet, floor: Ar
     floor: as for `begun`.
     """
     begin = evidence.until(DECIDED)
-    _, misfit = _further(known, begin)
-    limit = _score(misfit, known, begin) + STRONG
+    _, misfit = refined(known, begin)
+    limit = beginning_score(misfit, known, begin) + STRONG
     unheard = not viscous_is_heard(known, evidence, floor)
     laws, fewer = [known], simpler(known, sheet)
     while fewer:
-        fitted, left = _further(fewer.pop(0), begin)
-        no_worse = _score(left, fitted, begin) < limit
+        fitted, left = refined(fewer.pop(0), begin)
+        no_worse = beginning_score(left, fitted, begin) < limit
         no_worse |= unheard and VISCOUS in laws[0].effects and VISCOUS not in fitted.effects
         if no_worse or 0.5 * (left**2 - 1.0) < misfit**2 - 1.0:
             laws, fewer = [fitted, *laws], simpler(fitted, sheet)
     return laws
 
 
-def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
+def beginning_score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
     """Return the criterion of `select` for a fit whose state at rest was fitted along."""
     channels = np.full(np.count_nonzero(evidence.shown), misfit**2)
     return score(channels, evidence.duration(1.0) / CORRELATION_TIME, fitted.x.size)
@@ -249,11 +249,11 @@ def _score(misfit: float, fitted: Trial, evidence: Evidence) -> float:
 
 def follows_the_beginning(known: Trial, evidence: Evidence) -> bool:
     """Tell whether a trial's friction is near enough for the first DECIDED to be explained."""
-    _, misfit = _further(known, evidence.until(DECIDED))
+    _, misfit = refined(known, evidence.until(DECIDED))
     return misfit <= LEFT_EARLY
 
 
-def _further(known: Trial, evidence: Evidence) -> tuple[Trial, float]:
+def refined(known: Trial, evidence: Evidence) -> tuple[Trial, float]:
     """Fit a trial that is near the optimum; return it and its RMS error in units of the noise."""
     fitted = fitted_to(known, evidence, from_rest(known, evidence), ROUGH_ACCURACY)
     return known.continued(fitted), fitted.misfit

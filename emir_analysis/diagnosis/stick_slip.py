@@ -53,11 +53,12 @@ class Grown(NamedTuple):
     """A trial fitted to a beginning that grew, and the RMS error that was left, in the noise.
 
     With the state at rest that was fitted along: where it sticks, a sixtieth of half a resolver
-    step may part two runs. given_up: the beginning is not the whole.
+    step may part two runs. time: s, up to which it is fitted. given_up: that is not the whole.
     """
 
     trial: Trial
     left: float
+    time: float
     given_up: bool
 
     @property
@@ -76,7 +77,7 @@ class Growths:
     def __init__(self, evidence: Evidence) -> None:
         self._evidence = evidence
         self._end = max(float(e.time[-1]) for e in evidence.experiments)
-        self._before: dict[Law, tuple[float, Grown]] = {}  # left over the first, and then
+        self._before: dict[Law, tuple[Solution, Solution, Grown]] = {}  # first, last, and as grown
 
     def grown(self, known: Trial, rival: Trial | None = None) -> Grown:
         """Return a trial fitted to the whole.
@@ -89,27 +90,34 @@ class Growths:
 
     def at_noise(self, known: Trial) -> Grown | None:
         """Return the same if it is at the noise; given up where it clearly no longer is."""
-        found = self._grown(known, lambda _: AT_NOISE, again=False)
+        found = self.followed(known)
         return found if found.left_of_whole <= AT_NOISE else None
+
+    def followed(self, known: Trial) -> Grown:
+        """Return a trial fitted to as much as it follows: given up where it is off the noise."""
+        return self._grown(known, lambda _: AT_NOISE, again=False)
 
     def _grown(self, known: Trial, limit: Limit, *, again: bool = True) -> Grown:
         """Return a trial led until it leaves more than a limit.
 
-        again: also where it was given up when it was led before.
+        again: also where it was given up when it was led before, from there on.
         """
         x, part = from_rest(known, self._evidence), self._evidence.until(DECIDED)
-        first = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
+        first = last = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
+        time = DECIDED
         law = known.effects, is_gradual(known), is_along_the_way(known)
         if law in self._before:
-            before, ended = self._before[law]
-            if first.misfit * CLEARLY > before and not (ended.given_up and again):
-                return ended
-        if first.misfit > limit(part):
-            return Grown(known.continued(first), first.misfit, given_up=True)
-        fitted, time = led_on(known, self._evidence, first, DECIDED, self._end, descended, limit)
-        ended = Grown(known.continued(fitted), fitted.misfit, time < self._end)
-        self._before[law] = first.misfit, ended
-        return ended
+            before, ended, grown = self._before[law]
+            if first.misfit * CLEARLY > before.misfit:
+                if not (grown.given_up and again):
+                    return grown
+                first, last, time = before, ended, grown.time
+        if last.misfit > limit(self._evidence.until(time)):
+            return Grown(known.continued(last), last.misfit, time, given_up=True)
+        fitted, time = led_on(known, self._evidence, last, time, self._end, descended, limit)
+        grown = Grown(known.continued(fitted), fitted.misfit, time, time < self._end)
+        self._before[law] = first, fitted, grown
+        return grown
 
 
 def from_rest(known: Trial, evidence: Evidence) -> Array:

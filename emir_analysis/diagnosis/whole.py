@@ -1,7 +1,7 @@
 """Trials fitted to the free run of the whole recordings, each set of effects once."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from emir_analysis.diagnosis.friction_laws import (
 )
 from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD
+from emir_analysis.diagnosis.next_law import Laws, next_laws
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -88,8 +89,8 @@ class Whole:
             return None
         if not follows_the_beginning(chosen, self._evidence):
             return None
-        led = self._growths.grown(chosen)
-        return led.trial if led.left <= most else None
+        led = self._growths.followed(chosen)
+        return led.trial if led.left_of_whole <= most else None
 
     def _refined_again(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from where it ended, as long as that helps much.
@@ -229,14 +230,16 @@ class Whole:
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)
 
-    def with_friction(self, law: Trial, fuller: list[Trial], rival: Trial) -> Trial:
+    def with_friction(self, law: Trial, fuller: Sequence[Trial], rival: Trial) -> Trial:
         """Return a law of friction fitted to the whole; a fuller one if that alone is at the noise.
 
         A break-away may show in later sticks than those of the beginning, and whether friction
         comes by tanh or gradually shows in many sticks only. Along the way that seals give only
-        where none by the velocity is at the noise.
+        where none by the velocity is at the noise. What else is missing shows in the beginning
+        over which a law no longer follows the machine.
         """
-        found, ways = self._growths.grown(law, rival), [along_the_way(f) for f in (law, *fuller)]
+        found, (law, fuller) = self._following(Laws(law, fuller), rival)
+        ways = [along_the_way(f) for f in (law, *fuller)]
         by_the_way = is_along_the_way(law)
         if LEFT < found.left < HOPELESS and not is_gradual(law) and not by_the_way:
             late = self._instead(found, gradually(law, self._evidence), rival)
@@ -246,6 +249,24 @@ class Whole:
         if AT_NOISE < found.left < HOPELESS and not by_the_way:
             found = self._fuller(self._instead(found, ways[0], rival), ways[1:])
         return self._heard(found.trial)
+
+    def _following(self, laws: Laws, rival: Trial) -> tuple[Grown, Laws]:
+        """Return laws of which the first follows the machine to the end, led to the whole.
+
+        The same where none does, led as far as it is no worse than a rival.
+        """
+        told, led = laws, self._growths.followed(laws.law)
+        while led.left_of_whole > LEFT:
+            self._progress(f"what else the first {led.time:.0f} s say: {led.trial.name}")
+            found = next_laws(led, told, self._evidence, self._sheet)
+            if found is None:
+                break
+            told = found.laws
+            if led.given_up:
+                led = self._growths.followed(told.law)
+            else:
+                led = led._replace(trial=told.law, left=found.left)
+        return (self._growths.grown(laws.law, rival), laws) if led.given_up else (led, told)
 
     def _instead(self, found: Grown, law: Trial, rival: Trial) -> Grown:
         """Return a law led to the whole where it leaves less than what was found.
@@ -258,14 +279,14 @@ class Whole:
             led = self._growths.grown(law, min(found.trial, rival, key=self.score))
         return min(found, led, key=lambda each: each.left_of_whole)
 
-    def _fuller(self, found: Grown, fuller: list[Trial]) -> Grown:
+    def _fuller(self, found: Grown, fuller: Sequence[Trial]) -> Grown:
         """Return the first of fuller laws that is at the noise, where what was found is not."""
         if found.left_of_whole <= AT_NOISE:
             return found
         led = self._first_at_noise(fuller)
         return found if led is None else led
 
-    def _first_at_noise(self, laws: list[Trial]) -> Grown | None:
+    def _first_at_noise(self, laws: Sequence[Trial]) -> Grown | None:
         all_at_noise = (self._growths.at_noise(law) for law in laws)
         return next((led for led in all_at_noise if led is not None), None)
 

@@ -1,0 +1,109 @@
+"""What follows the machine where a law of friction no longer does: another law, or an effect more.
+
+Over the whole recording nothing tells which, since each instant of sticking shifts the next. Over
+the beginning up to where the law is off the noise the error is smooth, and every effect can be
+asked about as it is where nothing sticks.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from emir_analysis.diagnosis.evidence import Evidence
+from emir_analysis.diagnosis.friction_beginning import (
+    LEFT_EARLY,
+    beginning_score,
+    gradually,
+    refined,
+)
+from emir_analysis.diagnosis.friction_laws import (
+    COULOMB,
+    STRIBECK,
+    VISCOUS,
+    gradual,
+    is_along_the_way,
+    is_gradual,
+)
+from emir_analysis.diagnosis.screening import screen_free_run
+from emir_analysis.diagnosis.select import LEFT
+from emir_analysis.diagnosis.side_by_side import side_by_side
+from emir_analysis.diagnosis.stick_slip import Grown
+from emir_analysis.diagnosis.trial import Trial, trial
+from emir_plant.sheet import Sheet
+
+MOST_ASKED = 3  # effects that are fitted to that beginning
+MOST_BESIDE = 2  # effects beside friction
+IN_LAWS = {COULOMB, STRIBECK, VISCOUS}  # effects that fuller laws have
+
+
+class Laws(NamedTuple):
+    """A law of friction, with or without effects besides, and fuller ones that may be needed."""
+
+    law: Trial
+    fuller: Sequence[Trial]
+
+
+class Fitted(NamedTuple):
+    """Laws of which the first is fitted to a beginning, what it leaves there and its score.
+
+    left: RMS error in units of the noise.
+    """
+
+    laws: Laws
+    left: float
+    score: float
+
+
+def next_laws(lost: Grown, laws: Laws, evidence: Evidence, sheet: Sheet) -> Fitted | None:
+    """Return what explains the beginning that a law of friction no longer does; None: nothing.
+
+    lost: the law, led as far as it follows. laws: it and fuller ones. An effect more is asked about
+    where it does not follow to the end and no other law explains that beginning: it takes longer.
+    """
+    begin = evidence.until(lost.time)
+    found = _best(_other_laws(laws, evidence), begin, LEFT_EARLY if lost.given_up else LEFT)
+    if found is not None or not lost.given_up:
+        return found
+    return _best(_with_an_effect_more(lost.trial, laws, begin, sheet), begin, LEFT_EARLY)
+
+
+def _best(found: Sequence[Laws], begin: Evidence, most: float) -> Fitted | None:
+    """Return the laws of which the first explains a beginning best, fitted to it.
+
+    None where all leave more than most, in units of the noise.
+    """
+
+    def fitted(laws: Laws) -> Fitted:
+        law, left = refined(laws.law, begin)
+        return Fitted(laws._replace(law=law), left, beginning_score(left, law, begin))
+
+    fits = [fit for fit in side_by_side(fitted, found) if fit.left <= most]
+    return min(fits, key=lambda fit: fit.score, default=None)
+
+
+def _other_laws(laws: Laws, evidence: Evidence) -> list[Laws]:
+    """Return fuller laws, and the same one come gradually, where it comes by tanh."""
+    law, fuller = laws
+    found = [Laws(more, fuller[k + 1 :]) for k, more in enumerate(fuller)]
+    if not is_along_the_way(law) and not is_gradual(law):
+        found.append(Laws(gradually(law, evidence), [gradual(more) for more in fuller]))
+    return found
+
+
+def _with_an_effect_more(lost: Trial, laws: Laws, begin: Evidence, sheet: Sheet) -> list[Laws]:
+    """Return a law, and fuller ones, with each of the effects that promise most beside it."""
+    if sum(name not in IN_LAWS for name in lost.effects) == MOST_BESIDE:
+        return []
+    asked = [screened.trial for screened in screen_free_run(lost, sheet, begin)]
+    asked = [more for more in asked if more.effects[-1] not in IN_LAWS]
+    return [
+        Laws(more, [_with_effect(law, more, sheet) for law in laws.fuller])
+        for more in asked[:MOST_ASKED]
+    ]
+
+
+def _with_effect(law: Trial, more: Trial, sheet: Sheet) -> Trial:
+    """Return a law with the last effect of another, of the same size."""
+    found = trial(sheet, (*law.effects, more.effects[-1]), law)
+    return found.at(np.append(law.x, more.x[law.x.size - found.x.size :]))

@@ -186,9 +186,11 @@ class Rounds:
     def _in_held_back(self, best: Tried) -> list[Tried]:
         """Return what suffices with one effect more that acts in the part held back alone.
 
-        The part that the fits see is explained without, so that nothing there asks for it.
+        The part that the fits see is explained without, so that nothing there asks for it. Where
+        it sticks that part has to be at the noise: else it is the law that is off.
         """
-        if excess(best.trial, self._head) > beyond(EXPLAINED) or self.enough(best.trial):
+        most = AT_NOISE if sticks(best.trial) else EXPLAINED
+        if excess(best.trial, self._head) > beyond(most) or self.enough(best.trial):
             return []
         near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
         limit = (1.0 - PROMISING) * excess(best.trial, near)

@@ -58,7 +58,7 @@ def test_break_away_and_viscous_friction_are_found_from_coulomb_s() -> None:
     known = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
     law = begun(fullest(known, sheet), evidence, searched.floor)
     assert with_less_friction(law, evidence, sheet, searched.floor) == [law]
-    found, left, _ = Growths(evidence).grown(law)
+    found, left, *_ = Growths(evidence).grown(law)
     assert left < 1.03
     errors = np.concatenate(free_run_errors(found.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
@@ -101,7 +101,7 @@ def test_seals_that_give_before_they_slide_are_found() -> None:
     law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
     assert is_along_the_way(law)
     law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
-    fitted, left, _ = Growths(evidence).grown(law)
+    fitted, left, *_ = Growths(evidence).grown(law)
     assert left < 1.03
     assert fitted.effects == ("stribeck_friction",)
     stribeck = fitted.machine.effects.stribeck_friction
@@ -280,6 +280,27 @@ def test_a_law_is_led_to_the_whole_once(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(led) == 2
 
 
+def test_a_law_that_was_given_up_is_led_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, sheet, evidence = search({})
+    law, begun = fullest(trial(sheet, ()), sheet), []
+    whole = max(float(e.time[-1]) for e in evidence.experiments)
+    ends = iter([(at(law, 1.2), 12.0), (at(law, 1.3), whole)])
+
+    def lead(*arguments: object) -> tuple[Solution, float]:
+        begun.append((arguments[2], arguments[3]))
+        return next(ends)
+
+    first = at(law, 1.05)
+    monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: first)
+    monkeypatch.setattr(stick_slip, "led_on", lead)
+    growths = Growths(evidence)
+    lost = growths.followed(law)
+    assert growths.followed(law) is lost
+    assert (lost.left, lost.time, lost.given_up) == (1.2, 12.0, True)
+    assert growths.grown(law)[1:] == (1.3, whole, False)
+    assert [(fit.misfit, time) for fit, time in begun] == [(1.05, stick_slip.DECIDED), (1.2, 12.0)]
+
+
 def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction by the load in the machine, Coulomb's is led along; the rival has the truth."""
     load = {
@@ -301,9 +322,9 @@ def test_a_law_that_falls_behind_its_rival_is_given_up(monkeypatch: pytest.Monke
         return errors(known, part, points)
 
     monkeypatch.setattr(stick_slip, "_errors", watched)
-    _, left, given_up = Growths(evidence).grown(wrong, right)
-    assert given_up
-    assert left > 1.1
+    grown = Growths(evidence).grown(wrong, right)
+    assert grown.given_up
+    assert grown.left > 1.1
     assert max(reached) < whole
 
 
@@ -339,7 +360,9 @@ def test_what_is_led_to_the_noise_is_not_fitted_over_all_at_once(
 
     monkeypatch.setattr(whole_module, "follows_the_beginning", lambda *_: True)
     monkeypatch.setattr(whole_module, "refine_free_run", refine)
-    monkeypatch.setattr(Growths, "grown", lambda *_: Grown(known, left, given_up=False))
+    led = Grown(known, left, 16.0, given_up=False)
+    monkeypatch.setattr(Growths, "followed", lambda *_: led)
+    monkeypatch.setattr(Growths, "grown", lambda *_: led)
     searched.whole.fitted(known)
     assert len(fitted) == over_all
 

@@ -61,22 +61,24 @@ def next_laws(lost: Grown, laws: Laws, evidence: Evidence, sheet: Sheet) -> Fitt
     lost: the law, led as far as it follows. laws: it and fuller ones. An effect more is asked about
     where it does not follow to the end and no other law explains that beginning: it takes longer.
     """
-    begin = evidence.until(lost.time)
-    found = _best(_other_laws(laws, evidence), begin, LEFT_EARLY if lost.given_up else LEFT)
+    begins = evidence.until(lost.time_before), evidence.until(lost.time)
+    found = _best(_other_laws(laws, evidence), begins, LEFT_EARLY if lost.given_up else LEFT)
     if found is not None or not lost.given_up:
         return found
-    return _best(_with_an_effect_more(lost.trial, laws, begin, sheet), begin, LEFT_EARLY)
+    return _best(_with_an_effect_more(lost.before, laws, begins[0], sheet), begins, LEFT_EARLY)
 
 
-def _best(found: Sequence[Laws], begin: Evidence, most: float) -> Fitted | None:
-    """Return the laws of which the first explains a beginning best, fitted to it.
+def _best(found: Sequence[Laws], begins: Sequence[Evidence], most: float) -> Fitted | None:
+    """Return the laws of which the first explains a beginning best, fitted to shorter ones first.
 
     None where all leave more than most, in units of the noise.
     """
 
     def fitted(laws: Laws) -> Fitted:
-        law, left = refined(laws.law, begin)
-        return Fitted(laws._replace(law=law), left, beginning_score(left, law, begin))
+        law = laws.law
+        for begin in begins:
+            law, left = refined(law, begin)
+        return Fitted(laws._replace(law=law), left, beginning_score(left, law, begins[-1]))
 
     fits = [fit for fit in side_by_side(fitted, found) if fit.left <= most]
     return min(fits, key=lambda fit: fit.score, default=None)
@@ -91,14 +93,17 @@ def _other_laws(laws: Laws, evidence: Evidence) -> list[Laws]:
     return found
 
 
-def _with_an_effect_more(lost: Trial, laws: Laws, begin: Evidence, sheet: Sheet) -> list[Laws]:
-    """Return a law, and fuller ones, with each of the effects that promise most beside it."""
-    if sum(name not in IN_LAWS for name in lost.effects) == MOST_BESIDE:
+def _with_an_effect_more(law: Trial, laws: Laws, begin: Evidence, sheet: Sheet) -> list[Laws]:
+    """Return laws with each of the effects that promise most beside a law where it still follows.
+
+    Where it sticks at another instant no first-order step says anything.
+    """
+    if sum(name not in IN_LAWS for name in law.effects) == MOST_BESIDE:
         return []
-    asked = [screened.trial for screened in screen_free_run(lost, sheet, begin)]
+    asked = [screened.trial for screened in screen_free_run(law, sheet, begin)]
     asked = [more for more in asked if more.effects[-1] not in IN_LAWS]
     return [
-        Laws(more, [_with_effect(law, more, sheet) for law in laws.fuller])
+        Laws(more, [_with_effect(each, more, sheet) for each in laws.fuller])
         for more in asked[:MOST_ASKED]
     ]
 

@@ -49,17 +49,29 @@ def _anything(_: Evidence) -> float:
     return math.inf
 
 
+class Led(NamedTuple):
+    """A fit to a beginning, s, that grew, and the one before, to a shorter beginning, s."""
+
+    fitted: Solution
+    time: float
+    before: Solution
+    time_before: float
+
+
 class Grown(NamedTuple):
     """A trial fitted to a beginning that grew, and the RMS error that was left, in the noise.
 
     With the state at rest that was fitted along: where it sticks, a sixtieth of half a resolver
     step may part two runs. time: s, up to which it is fitted. given_up: that is not the whole.
+    before, time_before: as it was fitted to the beginning before, s.
     """
 
     trial: Trial
     left: float
     time: float
     given_up: bool
+    before: Trial
+    time_before: float
 
     @property
     def left_of_whole(self) -> float:
@@ -77,7 +89,7 @@ class Growths:
     def __init__(self, evidence: Evidence) -> None:
         self._evidence = evidence
         self._end = max(float(e.time[-1]) for e in evidence.experiments)
-        self._before: dict[Law, tuple[Solution, Solution, Grown]] = {}  # first, last, and as grown
+        self._before: dict[Law, tuple[Solution, Led, Grown]] = {}  # over the first, and then
 
     def grown(self, known: Trial, rival: Trial | None = None) -> Grown:
         """Return a trial fitted to the whole.
@@ -103,21 +115,26 @@ class Growths:
         again: also where it was given up when it was led before, from there on.
         """
         x, part = from_rest(known, self._evidence), self._evidence.until(DECIDED)
-        first = last = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
-        time = DECIDED
+        first = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
+        led = Led(first, DECIDED, first, DECIDED)
         law = known.effects, is_gradual(known), is_along_the_way(known)
         if law in self._before:
             before, ended, grown = self._before[law]
             if first.misfit * CLEARLY > before.misfit:
                 if not (grown.given_up and again):
                     return grown
-                first, last, time = before, ended, grown.time
-        if last.misfit > limit(self._evidence.until(time)):
-            return Grown(known.continued(last), last.misfit, time, given_up=True)
-        fitted, time = led_on(known, self._evidence, last, time, self._end, descended, limit)
-        grown = Grown(known.continued(fitted), fitted.misfit, time, time < self._end)
-        self._before[law] = first, fitted, grown
+                first, led = before, ended
+        if led.fitted.misfit > limit(self._evidence.until(led.time)):
+            return self._as_grown(known, led)
+        led = led_on(known, self._evidence, led.fitted, led.time, self._end, descended, limit)
+        grown = self._as_grown(known, led)
+        self._before[law] = first, led, grown
         return grown
+
+    def _as_grown(self, known: Trial, led: Led) -> Grown:
+        fitted, before = known.continued(led.fitted), known.continued(led.before)
+        given_up = led.time < self._end
+        return Grown(fitted, led.fitted.misfit, led.time, given_up, before, led.time_before)
 
 
 def from_rest(known: Trial, evidence: Evidence) -> Array:
@@ -128,7 +145,7 @@ def from_rest(known: Trial, evidence: Evidence) -> Array:
 def led(known: Trial, evidence: Evidence, x: Array, time: float, end: float) -> Solution:
     """Fit to beginnings that grow from a time to another, s, from x, (k + 2 r,)."""
     first = fitted_to(known, evidence.until(time), x, FREE_RUN_ACCURACY)
-    return led_on(known, evidence, first, time, end, fit)[0]
+    return led_on(known, evidence, first, time, end, fit).fitted
 
 
 def led_on(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
@@ -139,8 +156,8 @@ def led_on(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     end: float,
     method: Method,
     limit: Limit = _anything,
-) -> tuple[Solution, float]:
-    """Fit to beginnings that grow from a fit to one, s, to another; return until when, s, too.
+) -> Led:
+    """Fit to beginnings that grow from a fit to one, s, to another, s.
 
     Where the machine sticks at other instants than the free run, a fit mostly finds back to them.
     Where it does not, of machines drawn from what the beginning before leaves open one goes on
@@ -149,6 +166,7 @@ def led_on(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
     Given up where it leaves more over a beginning than the limit allows.
     """
     smooth, holds = is_along_the_way(known), True
+    led = Led(fitted, time, fitted, time)
     while time < end:
         holds = holds and fitted.misfit <= AT_NOISE
         growths = GROWTHS if holds else GROWTHS[:-1]
@@ -165,10 +183,11 @@ def led_on(  # noqa: PLR0913, PLR0917 (of one growth everything is needed)
             draws = (DRAWS_EARLY if longer <= EARLY else DRAWS) if holds else 1
             fitted = _found_again(known, part, fitted, method, accuracy, draws)
             holds = holds and fitted.misfit <= AS_BEFORE * before
+        led = Led(fitted, longer, led.fitted, time)
         time = longer
         if not follows and fitted.misfit > limit(part):
             break
-    return fitted, time
+    return led
 
 
 def followed(  # noqa: PLR0913, PLR0917 (as led_on)

@@ -266,7 +266,19 @@ class Whole:
                 led = self._growths.followed(told.law)
             else:
                 led = led._replace(trial=told.law, left=found.left)
-        return (self._growths.grown(laws.law, rival), laws) if led.given_up else (led, told)
+        if led.given_up:
+            return self._growths.grown(laws.law, rival), laws
+        return (led if told is laws else self._without_viscous(led)), told
+
+    def _without_viscous(self, led: Grown) -> Grown:
+        """Return a law without viscous friction, which may have been needed on the way only.
+
+        As it was where that is not at the noise.
+        """
+        if VISCOUS not in led.trial.effects:
+            return led
+        less = self._growths.followed(led.trial.without(VISCOUS))
+        return less if less.left_of_whole <= LEFT else led
 
     def _instead(self, found: Grown, law: Trial, rival: Trial) -> Grown:
         """Return a law led to the whole where it leaves less than what was found.

@@ -49,10 +49,11 @@ def lost(missing: dict[str, float]) -> Lost:
     fuller = fit_balances(trial(sheet, STRIBECK), evidence, searched.floor)
     for time in (3.0, 5.0, 10.0):
         fuller, _ = refined(fuller, evidence.until(time))
-    law, _ = refined(without_breakaway(fuller, sheet), evidence.until(10.0))
-    law, left = refined(law, evidence)
+    before, _ = refined(without_breakaway(fuller, sheet), evidence.until(10.0))
+    law, left = refined(before, evidence)
     assert left > LEFT_EARLY
-    return Lost(Grown(law, left, 20.0, given_up=True), Laws(law, [fuller]), evidence, sheet)
+    led = Grown(law, left, 20.0, True, before, 10.0)
+    return Lost(led, Laws(law, [fuller]), evidence, sheet)
 
 
 def test_an_effect_that_the_balances_hardly_hear_is_found_beside_friction() -> None:

@@ -33,7 +33,7 @@ from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT, at_noise
-from emir_analysis.diagnosis.stick_slip import Grown, Growths
+from emir_analysis.diagnosis.stick_slip import Grown, Growths, Led
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
@@ -264,9 +264,9 @@ def test_a_law_is_led_to_the_whole_once(monkeypatch: pytest.MonkeyPatch) -> None
     whole = max(float(e.time[-1]) for e in evidence.experiments)
     beginnings = iter([1.09, 1.08, 1.05, 1.2])
 
-    def lead(*arguments: object) -> tuple[Solution, float]:
+    def lead(*arguments: object) -> Led:
         led.append(arguments)
-        return at(law, 1.3), whole
+        return Led(at(law, 1.3), whole, at(law, 1.0), 12.0)
 
     monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: at(law, next(beginnings)))
     monkeypatch.setattr(stick_slip, "led_on", lead)
@@ -283,21 +283,21 @@ def test_a_law_is_led_to_the_whole_once(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_law_that_was_given_up_is_led_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
     _, sheet, evidence = search({})
     law, begun = fullest(trial(sheet, ()), sheet), []
-    whole = max(float(e.time[-1]) for e in evidence.experiments)
-    ends = iter([(at(law, 1.2), 12.0), (at(law, 1.3), whole)])
+    whole, first = max(float(e.time[-1]) for e in evidence.experiments), at(law, 1.05)
+    followed, lost = Led(at(law, 1.2), 12.0, first, 10.0), Led(at(law, 1.3), whole, first, 12.0)
+    ends = iter([followed, lost])
 
-    def lead(*arguments: object) -> tuple[Solution, float]:
+    def lead(*arguments: object) -> Led:
         begun.append((arguments[2], arguments[3]))
         return next(ends)
 
-    first = at(law, 1.05)
     monkeypatch.setattr(stick_slip, "fitted_to", lambda *_: first)
     monkeypatch.setattr(stick_slip, "led_on", lead)
     growths = Growths(evidence)
-    lost = growths.followed(law)
-    assert growths.followed(law) is lost
-    assert (lost.left, lost.time, lost.given_up) == (1.2, 12.0, True)
-    assert growths.grown(law)[1:] == (1.3, whole, False)
+    found = growths.followed(law)
+    assert growths.followed(law) is found
+    assert found[1:4] == (1.2, 12.0, True)
+    assert growths.grown(law)[1:4] == (1.3, whole, False)
     assert [(fit.misfit, time) for fit, time in begun] == [(1.05, stick_slip.DECIDED), (1.2, 12.0)]
 
 
@@ -360,7 +360,7 @@ def test_what_is_led_to_the_noise_is_not_fitted_over_all_at_once(
 
     monkeypatch.setattr(whole_module, "follows_the_beginning", lambda *_: True)
     monkeypatch.setattr(whole_module, "refine_free_run", refine)
-    led = Grown(known, left, 16.0, given_up=False)
+    led = Grown(known, left, 16.0, False, known, 12.0)
     monkeypatch.setattr(Growths, "followed", lambda *_: led)
     monkeypatch.setattr(Growths, "grown", lambda *_: led)
     searched.whole.fitted(known)

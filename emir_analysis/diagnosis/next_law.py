@@ -60,12 +60,15 @@ def next_laws(lost: Grown, laws: Laws, evidence: Evidence, sheet: Sheet) -> Fitt
 
     lost: the law, led as far as it follows. laws: it and fuller ones. An effect more is asked about
     where it does not follow to the end and no other law explains that beginning: it takes longer.
+    Beside fuller laws, too, where none beside the law itself explains it.
     """
     begins = evidence.until(lost.time_before), evidence.until(lost.time)
     found = _best(_other_laws(laws, evidence), begins, LEFT_EARLY if lost.given_up else LEFT)
     if found is not None or not lost.given_up:
         return found
-    return _best(_with_an_effect_more(lost.before, laws, begins[0], sheet), begins, LEFT_EARLY)
+    more = _with_an_effect_more(lost.before, laws, begins[0], sheet)
+    fuller = [each for with_effect in more for each in _fuller(with_effect)]
+    return _best(more, begins, LEFT_EARLY) or _best(fuller, begins, LEFT_EARLY)
 
 
 def _best(found: Sequence[Laws], begins: Sequence[Evidence], most: float) -> Fitted | None:
@@ -87,10 +90,14 @@ def _best(found: Sequence[Laws], begins: Sequence[Evidence], most: float) -> Fit
 def _other_laws(laws: Laws, evidence: Evidence) -> list[Laws]:
     """Return fuller laws, and the same one come gradually, where it comes by tanh."""
     law, fuller = laws
-    found = [Laws(more, fuller[k + 1 :]) for k, more in enumerate(fuller)]
+    found = _fuller(laws)
     if not is_along_the_way(law) and not is_gradual(law):
         found.append(Laws(gradually(law, evidence), [gradual(more) for more in fuller]))
     return found
+
+
+def _fuller(laws: Laws) -> list[Laws]:
+    return [Laws(more, laws.fuller[k + 1 :]) for k, more in enumerate(laws.fuller)]
 
 
 def _with_an_effect_more(law: Trial, laws: Laws, begin: Evidence, sheet: Sheet) -> list[Laws]:

@@ -82,3 +82,14 @@ def test_a_fuller_law_is_asked_about_before_any_effect() -> None:
     stribeck = found.laws.law.machine.effects.stribeck_friction
     assert stribeck.breakaway == pytest.approx(1.8, rel=0.05)
     assert not found.laws.fuller
+
+
+def test_a_break_away_and_an_effect_are_found_that_explain_only_together() -> None:
+    led, laws, evidence, sheet = lost(BREAKING_AWAY | SHIFTED)
+    found = next_laws(led, laws, evidence, sheet)
+    assert found is not None
+    law = found.laws.law
+    assert law.effects == (*STRIBECK, "valve_null_offset")
+    assert found.left < 1.03
+    assert law.machine.effects.valve_null_offset.offset == pytest.approx(1.5e-3, rel=0.1)
+    assert law.machine.effects.stribeck_friction.breakaway == pytest.approx(1.8, rel=0.05)

@@ -62,7 +62,7 @@ def next_laws(lost: Grown, laws: Laws, evidence: Evidence, sheet: Sheet) -> Fitt
     where it does not follow to the end and no other law explains that beginning: it takes longer.
     Beside fuller laws, too, where none beside the law itself explains it.
     """
-    begins = evidence.until(lost.time_before), evidence.until(lost.time)
+    begins = [evidence.until(time) for time in sorted({lost.time_before, lost.time})]
     found = _best(_other_laws(laws, evidence), begins, LEFT_EARLY if lost.given_up else LEFT)
     if found is not None or not lost.given_up:
         return found
@@ -105,7 +105,7 @@ def _with_an_effect_more(law: Trial, laws: Laws, begin: Evidence, sheet: Sheet) 
 
     Where it sticks at another instant no first-order step says anything.
     """
-    if sum(name not in IN_LAWS for name in law.effects) == MOST_BESIDE:
+    if sum(name not in IN_LAWS for name in law.effects) >= MOST_BESIDE:
         return []
     asked = [screened.trial for screened in screen_free_run(law, sheet, begin)]
     asked = [more for more in asked if more.effects[-1] not in IN_LAWS]

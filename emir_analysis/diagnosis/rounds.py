@@ -74,21 +74,21 @@ class Rounds:
         """Return what is better with one effect more.
 
         Where missing sensors leave balances out, what those would show is in the free run alone:
-        that is asked too where the others lead nowhere near, and where they are quiet: what acts
+        that is asked too where the others do not explain it, and where they are quiet: what acts
         in a few windows only, or hardly more than their noise, does not tell there which it is.
         """
         better = []
         if np.any(self._evidence.fitted):
             found = self._on_balances(best.trial).singles
             better = self._by_balances(found, best)
-            near = any(self._excess(t.trial) < beyond(HOPELESS) for t in better)
+            near = any(self._excess(t.trial) < beyond(EXPLAINED) for t in better)
             told = near or self._evidence.complete
             if told and not self._quiet(best.trial):
-                return better or self._in_held_back(best)
+                return better or self._acting_late(best)
         known = [t.trial.effects for t in better]
         others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
         better += self._better(others, best)
-        return better or self._in_held_back(best)
+        return better or self._acting_late(best)
 
     def beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.
@@ -182,6 +182,19 @@ class Rounds:
     def scored(self, tried: Trial, free_run: float | None = None) -> Tried:
         """Return a trial with its scores; free_run: if it is known."""
         return Tried(tried, balance_score(tried, self._evidence, self._floor), free_run)
+
+    def _acting_late(self, best: Tried) -> list[Tried]:
+        """Return what suffices with an effect that acts in the part held back alone.
+
+        Beside the best so far, or beside what explains with one effect more all that the fits see.
+        """
+        late = self._in_held_back(best)
+        if late or at_noise(best.trial, self._head):
+            return late
+        more = [t for t in self.tried if set(t.trial.effects) > set(best.trial.effects)]
+        told = [t for t in more if t.free_run is not None and at_noise(t.trial, self._head)]
+        nearest = min(told, key=lambda t: excess(t.trial, self._head), default=None)
+        return [] if nearest is None else self._in_held_back(nearest)
 
     def _in_held_back(self, best: Tried) -> list[Tried]:
         """Return what suffices with one effect more that acts in the part held back alone.

@@ -192,8 +192,8 @@ class Whole:
     def plainer(self, fitted: Trial) -> Trial:
         """Return a trial with one size of an effect alone where that explains the whole as well.
 
-        Or with Coulomb's friction in place of one whose break-away may be none, or with a late
-        command in place of sensors that are all equally late. Two sizes together
+        Or with Coulomb's friction in place of one whose break-away may be none, with a late command
+        in place of sensors that are all equally late, or with what is usual for a share. Two sizes together
         may lead to where neither is right, such as a negative compliance.
         """
         fitted = self._with_late_command(fitted)
@@ -204,7 +204,23 @@ class Whole:
             plain = without_breakaway(fitted, self._sheet)
             smooth = refine_free_run(plain, self._evidence, fitted)
             fitted = min(smooth, fitted, key=self.score)
+        fitted = self._with_usual_shares(fitted)
         self.keep(fitted)
+        return fitted
+
+    def _with_usual_shares(self, fitted: Trial) -> Trial:
+        """Return a trial fitted again with what is usual for shares in between, where as good.
+
+        Along with a size beside it a share is led far where little changes, as that of a leak of
+        a chamber whose pressure is not measured.
+        """
+        for k, unknown in enumerate(fitted.unknowns.members):
+            if unknown.is_share and unknown.low < fitted.x[k] < unknown.high:
+                usual = round(declared(self._sheet.machine)[unknown.path][1])
+                fixed = fitted.fixed(unknown.path, float(usual))
+                again = refine_free_run(fixed, self._evidence, fitted)
+                if self.score(again) <= self.score(fitted):
+                    return self._with_usual_shares(again)
         return fitted
 
     def _with_late_command(self, fitted: Trial) -> Trial:

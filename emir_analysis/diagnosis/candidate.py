@@ -29,7 +29,7 @@ FINER = tuple(s / 5.0 for s in range(-4, 5))  # steps about the best of these
 SMALL = 0.1  # trial sizes, at which a machine is near enough to the known one
 SHARES = (1.0, 0.5, 0.25)  # of a first-order step on the free run that are simulated
 COST_DECIMALS = 6  # decimals of the cost, to which what leaves the same is told from rounding
-RUNAWAY = 1e100  # times the noise: what is left of a machine that does not run; its square overflows
+RUNAWAY = 1e100  # times the noise: what a machine leaves that does not run; its square overflows
 SOFT_NOISE = 0.354  # mean of sqrt(1 + z^2) - 1, a soft square, of noise z
 AT_TIP, ON_PISTON = 0.0, 1.0  # share of a load on the piston
 

@@ -68,6 +68,7 @@ class Rounds:
         self._whole, self._progress = whole, progress
         self._head = evidence.head(SEEN)
         self.tried: list[Tried] = []
+        self._asked: set[frozenset[str]] = set()  # effects beside which another was looked for
         self._beside_none: OnBalances | None = None
 
     def beside(self, best: Tried) -> list[Tried]:
@@ -77,6 +78,7 @@ class Rounds:
         that is asked too where the others do not explain it, and where they are quiet: what acts
         in a few windows only, or hardly more than their noise, does not tell there which it is.
         """
+        self._asked.add(frozenset(best.trial.effects))
         better = []
         if np.any(self._evidence.fitted):
             found = self._on_balances(best.trial).singles
@@ -89,6 +91,31 @@ class Rounds:
         others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
         better += self._better(others, best)
         return better or self._acting_late(best)
+
+    def exchanged(self, full: Trial) -> list[Tried]:
+        """Return what is better on the whole with another effect in place of one of several.
+
+        What came first may stand for another, which shows once what came later is known
+        (floating search, Pudil et al. 1994). full: fitted to the whole.
+        """
+        found: list[Tried] = []
+        for effect in full.effects:
+            fewer = full.without(effect)
+            if frozenset(fewer.effects) not in self._asked:
+                self._progress(f"all effects in place of: {effect}")
+                known = self._known_seen(fewer)
+                found += self.beside(self.scored(known, free_run_score(known, self._evidence)))
+        if self._evidence.complete:
+            least = self.scored(full).balances - STRONG
+            found = [t for t in found if t.balances < least]
+        limit = self._whole.score(full) - STRONG
+        return [t for t in found if self._whole.score(self._whole.fitted(t.trial)) < limit]
+
+    def _known_seen(self, known: Trial) -> Trial:
+        """Return a trial as effects are looked for beside it, by the part that the fits see."""
+        if self._evidence.complete:
+            return fit_balances(known, self._head, self._floor)
+        return fit_free_run(known, self._head)
 
     def beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.

@@ -99,12 +99,26 @@ class Search:
             enough = self._rounds.enough(best.trial)
         if not enough and not (self.misstated.better_than(best.trial) or self.drifting):
             equal = self._two_at_once(plain, best) or equal
+        equal = self._with_others_in_place(equal)
         needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
         if needed is not equal[0]:
             equal = self._equal.get(needed.effects, [needed])
         return self._rivals_on_the_whole(equal)
+
+    def _with_others_in_place(self, equal: list[Trial]) -> list[Trial]:
+        """Return the best trials with other effects in place of some of several, where better.
+
+        The same where they are at the noise, nowhere near, or stick, which takes too long.
+        """
+        if not equal[0].effects[1:] or sticks(equal[0]):
+            return equal
+        full = self.whole.fitted(equal[0])
+        if at_noise(full, self._evidence) or self._excess(full) > beyond(HOPELESS):
+            return equal
+        better = self._rounds.exchanged(full)
+        return self._with_others_in_place(_as_good(better)) if better else equal
 
     def _rivals_on_the_whole(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trial and those that are as good on the whole, too.

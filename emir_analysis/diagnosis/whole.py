@@ -193,8 +193,8 @@ class Whole:
         """Return a trial with one size of an effect alone where that explains the whole as well.
 
         Or with Coulomb's friction in place of one whose break-away may be none, with a late command
-        in place of sensors that are all equally late, or with what is usual for a share. Two sizes together
-        may lead to where neither is right, such as a negative compliance.
+        in place of sensors that are all equally late, or with what is usual for a share. Two sizes
+        together may lead to where neither is right, such as a negative compliance.
         """
         fitted = self._with_late_command(fitted)
         if not sticks(fitted):

@@ -337,6 +337,55 @@ def test_a_fault_of_the_logic_block_that_shuts_in_the_part_held_back_alone_is_fo
     assert threshold == pytest.approx(30e5, rel=0.02)
 
 
+def test_what_acts_late_is_found_beside_an_effect_that_explains_the_part_before() -> None:
+    """A gauge is off; a logic block shuts in the part held back alone, and drives it away there."""
+    lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
+    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 2)
+    hidden = {"logic_block_fault.threshold": 30e5, "sensor_bias.pressure_lifting": 1e5}
+    values = {f"effects.{path}": value for path, value in hidden.items()}
+    run = operated(with_values(joint1(), values), np.concatenate([lifted, lowered]), angle=1.2)
+    evidence = Evidence([run], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    found = searched.whole.fitted(searched.run()[0])
+    assert set(found.effects) == {"logic_block_fault", "sensor_bias"}
+    assert at_noise(found, evidence)
+    for path, value in values.items():
+        assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.02)
+
+
+def test_without_a_gauge_the_free_run_is_asked_until_it_is_explained() -> None:
+    """Beside a payload the one chamber's balance leads to the valve, 2.5 times the noise off."""
+    hidden = {"effects.payload.mass": 60.0, "effects.external_leakage.lowering": 2e-12}
+    run = without_p_s(moved(with_values(joint1(), hidden), duration=40.0))
+    evidence = Evidence([run], joint1())
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    rounds, head = Search(evidence, sheet, lambda _: None)._rounds, evidence.head(SEEN)
+    floor = evidence.floor(joint1())
+    payload = fit_free_run(fit_balances(trial(sheet, ("payload",)), head, floor), head)
+    better = rounds.beside(rounds.scored(payload, free_run_score(payload, evidence)))
+    at_the_noise = [each.trial for each in better if at_noise(each.trial, evidence)]
+    assert [each.effects for each in at_the_noise] == [("payload", "external_leakage")]
+
+
+def test_an_effect_that_stood_for_another_is_exchanged() -> None:
+    """A gain that differs with the direction was first, for a spool off its middle."""
+    hidden = {
+        "effects.viscous_friction.coefficient": 6e5,
+        "effects.valve_dead_zone_error.error": 0.0314,
+        "effects.valve_null_offset.offset": -0.0105,
+    }
+    evidence = Evidence([moved(with_values(joint1(), hidden), duration=24.0)], joint1())
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    searched = Search(evidence, sheet, lambda _: None)
+    effects = ("viscous_friction", "valve_gain_asymmetry", "valve_dead_zone_error")
+    wrong = fit_balances(trial(sheet, effects), evidence, searched.floor)
+    (found,) = searched._with_others_in_place([wrong])
+    found = searched.whole.fitted(found)
+    assert at_noise(found, evidence)
+    for path, value in hidden.items():
+        assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.02)
+
+
 def test_what_acts_little_and_late_is_found() -> None:
     """It lowers from the last third on: parameters alone are at the noise before, and near it."""
     lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
@@ -560,6 +609,21 @@ def test_a_share_is_none_or_all_where_the_recording_does_not_tell(
     assert found.machine.effects.sensor_delay.dead_share == pytest.approx(share, abs=0.1)
     members = [unknown.path for unknown in found.unknowns.members]
     assert ("effects.sensor_delay.dead_share" in members) == told
+
+
+def test_a_share_in_between_is_as_usual_where_that_leaves_as_little() -> None:
+    """As of a leak of a chamber without its gauge: along with its size little changes."""
+    leak = {"effects.external_leakage.lowering": 2e-12}
+    run = without_p_s(moved(with_values(joint1(), leak)))
+    searched, sheet, evidence = search({}, lambda _: run)
+    share, effects = "effects.external_leakage.turbulent_share", ("external_leakage",)
+    known = trial(sheet, effects).with_one_size("external_leakage", "lowering")
+    between = fit_free_run(known.fixed(share, 0.4), evidence)
+    values = between.unknowns.values(between.x) | {share: 0.4}
+    x = [unknown.at(values[unknown.path]) for unknown in known.unknowns.members]
+    found = searched.whole.plainer(known.at(np.array(x)))
+    assert found.machine.effects.external_leakage.turbulent_share == 0.0
+    assert found.machine.effects.external_leakage.lowering == pytest.approx(2e-12, rel=0.03)
 
 
 def test_a_share_finds_back_from_the_wrong_end() -> None:

@@ -87,6 +87,21 @@ def test_parameters_that_do_their_best_stay_inside_their_bounds_to_the_last_digi
     assert on_bounds > 100
 
 
+def test_a_machine_that_runs_away_leaves_the_parameters_as_they_are() -> None:
+    """It leaves so much that its square is no number: no change of theirs leads anywhere."""
+    members = unknowns(Sheet(joint1(), {}, {}, ()), ("valve_dead_zone_error",))
+    known = Trial((), members, members.start, np.full((members.start.size,) * 2, np.nan))
+    runaway = known.at(members.start + 1e-3)
+
+    def missing(trials: list[Trial]) -> Array:
+        left = [1e171 if one is runaway else 30.0 for one in trials]
+        return np.outer(left, np.linspace(1.0, 2.0, 40)) + [[5.0 * one.x[0]] for one in trials]
+
+    residuals, x = Left(known, missing, 1e-3).inside([known, runaway])
+    assert np.all(x[1] == known.x)
+    assert np.max(residuals[1]) >= 1e171
+
+
 def similar(size: float) -> Machine:
     """Return a machine so many times as long as EMIR, at the same pressures, times and angles.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from emir_analysis.diagnosis.balances import level
+from emir_analysis.diagnosis.balances import FORCE, level
 from emir_analysis.diagnosis.candidate import Screened
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
@@ -14,7 +14,7 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.late_end import with_a_late_end
 from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.screening import OnBalances, screen_free_run
+from emir_analysis.diagnosis.screening import OnBalances, screen_faint_load, screen_free_run
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
@@ -246,15 +246,20 @@ class Rounds:
         """Yield trials with one effect more that leave less than a limit, fitted to the whole.
 
         evidence: in whose free run they are looked for. Once one suffices, only those are fitted
-        that are at the noise there as they are begun.
+        that are at the noise there as they are begun. A faint load is asked about where none is.
         """
-        told = False
-        for screened in screen_free_run(known, self._sheet, evidence, faint=True)[:MOST_SIMULATED]:
+        told = explains = False
+        for screened in screen_free_run(known, self._sheet, evidence)[:MOST_SIMULATED]:
             most = beyond(AT_NOISE) if told else limit
             if excess(screened.trial, evidence) < most:
                 fitted = self._whole.fitted_from(screened.trial)
                 yield fitted
                 told = told or self.enough(fitted)
+                explains = explains or at_noise(fitted, self._evidence)
+        if self._evidence.told[FORCE] and not explains and LOAD not in known.effects:
+            loaded = screen_faint_load(known, self._sheet, evidence).trial
+            if excess(loaded, evidence) < limit:
+                yield self._whole.fitted_from(loaded)
 
     def _on_balances(self, known: Trial) -> OnBalances:
         """Return each effect begun beside a trial; beside none they are asked for twice."""

@@ -4,6 +4,7 @@ Cheap enough for every effect of the registry, since only its own few fields are
 `candidate.py`).
 """
 
+from collections.abc import Iterable
 from functools import cached_property
 from itertools import combinations
 
@@ -83,24 +84,33 @@ class OnBalances:
         return sorted(side_by_side(Candidate.fitted, together), key=lambda s: s.cost)
 
 
-def screen_free_run(
-    known: Trial, sheet: Sheet, evidence: Evidence, *, faint: bool = False
-) -> list[Screened]:
+def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Screened]:
     """Return the known trial with each further effect of the registry, the best first.
 
     By the free run, for a known trial whose balances are quiet: the step that is best to first
     order promises too much far from there, so it is simulated, and shorter ones too.
-    faint: loads are told by the free run even where there is a balance of forces, in which they
-    may be less than its noise; that takes long.
     """
     missing = in_free_run(known, evidence)
     left = Left(known, missing, FREE_RUN_STEP)
     loads = _by_balance(known, evidence)
-    if faint or not evidence.told[FORCE]:
+    if not evidence.told[FORCE]:
         loads += _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
     stepped = side_by_side(lambda c: c.stepped(missing), begun)
     return sorted(stepped, key=lambda s: s.cost)
+
+
+def screen_faint_load(known: Trial, sheet: Sheet, evidence: Evidence) -> Screened:
+    """Return the known trial with a load from outside that the free run tells.
+
+    As `screen_free_run`, for one that may be less than the noise of the balance of forces; that
+    takes as long as all other effects together.
+    """
+    missing = in_free_run(known, evidence)
+    left = Left(known, missing, FREE_RUN_STEP)
+    loads = _by_free_run(known, sheet, evidence, left)
+    (begun,) = _begun(known, sheet, loads, left, SMALL, (LOAD,))
+    return begun.stepped(missing)
 
 
 def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:
@@ -130,10 +140,15 @@ def _by_free_run(known: Trial, sheet: Sheet, evidence: Evidence, left: Left) -> 
     return likely(of_steps(begin, np.nan_to_num(changed / size), -np.nan_to_num(nothing)))
 
 
-def _begun(
-    known: Trial, sheet: Sheet, loads: list[Load], left: Left, size: float = 1.0
+def _begun(  # noqa: PLR0913, PLR0917 (what one effect is begun by)
+    known: Trial,
+    sheet: Sheet,
+    loads: list[Load],
+    left: Left,
+    size: float = 1.0,
+    names: Iterable[str] = REGISTRY,
 ) -> list[Candidate]:
-    """Begin each further effect; size: of its starts, in those on the balances."""
+    """Begin each further effect of some; size: of its starts, in those on the balances."""
 
     def begin(name: str) -> Candidate:
         start = trial(sheet, (*known.effects, name), known)
@@ -141,7 +156,7 @@ def _begun(
         starts = starting_fields(name, members, loads, size)
         return Candidate(start, known.x.size, starts, left)
 
-    return side_by_side(begin, (name for name in REGISTRY if name not in known.effects))
+    return side_by_side(begin, (name for name in names if name not in known.effects))
 
 
 def _expected(one: Candidate, other: Candidate, nothing: Array) -> float:

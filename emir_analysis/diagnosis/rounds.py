@@ -98,24 +98,30 @@ class Rounds:
         What came first may stand for another, which shows once what came later is known
         (floating search, Pudil et al. 1994). full: fitted to the whole.
         """
+        least = self.scored(full).balances - STRONG if self._evidence.complete else np.inf
         found: list[Tried] = []
         for effect in full.effects:
             fewer = full.without(effect)
             if frozenset(fewer.effects) not in self._asked:
                 self._progress(f"all effects in place of: {effect}")
-                known = self._known_seen(fewer)
-                found += self.beside(self.scored(known, free_run_score(known, self._evidence)))
-        if self._evidence.complete:
-            least = self.scored(full).balances - STRONG
-            found = [t for t in found if t.balances < least]
+                found += self._in_its_place(fewer, least)
         limit = self._whole.score(full) - STRONG
         return [t for t in found if self._whole.score(self._whole.fitted(t.trial)) < limit]
 
-    def _known_seen(self, known: Trial) -> Trial:
-        """Return a trial as effects are looked for beside it, by the part that the fits see."""
-        if self._evidence.complete:
-            return fit_balances(known, self._head, self._floor)
-        return fit_free_run(known, self._head)
+    def _in_its_place(self, fewer: Trial, least: float) -> list[Tried]:
+        """Return a trial with one effect more, fitted to the free run.
+
+        least: score on the balances, where all are told, of what is worth that.
+        """
+        if not self._evidence.complete:
+            known = fit_free_run(fewer, self._head)
+            return self.beside(self.scored(known, free_run_score(known, self._evidence)))
+        known = fit_balances(fewer, self._head, self._floor)
+        begun = self._fitted_to_balances(self._on_balances(known).singles)
+        promising = sorted((t for t in begun if t.balances < least), key=lambda t: t.balances)
+        found = side_by_side(self._simulated, promising[:MOST_SIMULATED])
+        self.tried += found + [t for t in begun if t not in promising[:MOST_SIMULATED]]
+        return found
 
     def beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.

@@ -97,9 +97,10 @@ class Search:
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
             enough = self._rounds.enough(best.trial)
-        if not enough and not (self.misstated.better_than(best.trial) or self.drifting):
-            equal = self._two_at_once(plain, best) or equal
-        equal = self._with_others_in_place(equal)
+        if enough or not (self.misstated.better_than(best.trial) or self.drifting):
+            if not enough:
+                equal = self._two_at_once(plain, best) or equal
+            equal = self._with_others_in_place(equal)
         needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]

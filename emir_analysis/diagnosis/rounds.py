@@ -104,23 +104,25 @@ class Rounds:
             fewer = full.without(effect)
             if frozenset(fewer.effects) not in self._asked:
                 self._progress(f"all effects in place of: {effect}")
+                self._asked.add(frozenset(fewer.effects))
                 found += self._in_its_place(fewer, least)
         limit = self._whole.score(full) - STRONG
         return [t for t in found if self._whole.score(self._whole.fitted(t.trial)) < limit]
 
     def _in_its_place(self, fewer: Trial, least: float) -> list[Tried]:
-        """Return a trial with one effect more, fitted to the free run.
+        """Return trials with one effect more, fitted to the free run.
 
-        least: score on the balances, where all are told, of what is worth that.
+        least: score on the balances, where all are told, below which that is worthwhile.
         """
         if not self._evidence.complete:
             known = fit_free_run(fewer, self._head)
             return self.beside(self.scored(known, free_run_score(known, self._evidence)))
         known = fit_balances(fewer, self._head, self._floor)
         begun = self._fitted_to_balances(self._on_balances(known).singles)
-        promising = sorted((t for t in begun if t.balances < least), key=lambda t: t.balances)
-        found = side_by_side(self._simulated, promising[:MOST_SIMULATED])
-        self.tried += found + [t for t in begun if t not in promising[:MOST_SIMULATED]]
+        close = sorted((t for t in begun if t.balances < least), key=lambda t: t.balances)
+        promising = close[:MOST_SIMULATED]
+        found = side_by_side(self._simulated, promising)
+        self.tried += found + [t for t in begun if t not in promising]
         return found
 
     def beside_enough(self, best: Tried) -> list[Tried]:

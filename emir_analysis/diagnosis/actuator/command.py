@@ -21,9 +21,15 @@ from emir_analysis.diagnosis.actuator.result import (
     noise_floor,
     stages,
 )
-from emir_analysis.diagnosis.actuator.search import Progress, Search, search
+from emir_analysis.diagnosis.actuator.search import (
+    Progress,
+    Search,
+    parameters_only,
+    search,
+)
 from emir_analysis.diagnosis.actuator.verdict import verdict
 from emir_analysis.diagnosis.result import write_json
+from emir_analysis.diagnosis.select import AT_NOISE
 from emir_analysis.errors import IncompleteError, InputError
 from emir_analysis.import_command import write_signals
 from emir_analysis.outputs import check_outputs, write_all
@@ -93,18 +99,39 @@ def _found(
     And the sheet, with the noise as measured where that is more than stated.
     """
     fitting = Fitting(sheet, record, noise_floor(sheet, record))
-    found = search(fitting, progress)
-    if verdict(sheet, found, fitting.noise) == "unexplained":
-        sheet, line = as_left(sheet, found.chosen, record)
-        _tell(line, progress)
-        fitting = Fitting(sheet, record, noise_floor(sheet, record))
-    if verdict(sheet, found, fitting.noise) == "unexplained":
-        progress("other values in the data sheet")
+    found = _searched(fitting, progress)
+    if found.misstated or verdict(sheet, found, fitting.noise) != "unexplained":
+        return sheet, found
+    sheet, line = as_left(sheet, found.chosen, record)
+    _tell(line, progress)
+    fitting = Fitting(sheet, record, noise_floor(sheet, record))
+    if verdict(sheet, found, fitting.noise) != "unexplained":
+        return sheet, found
+    if line:  # beside more noise a value of the sheet may explain all
         found = replace(found, misstated=misstated(fitting, found.plain))
-        if found.misstated is None:
-            progress("measuring what has no name")
-            found = replace(found, curve=measured(fitting, found))
+    if found.misstated is None:
+        progress("measuring what has no name")
+        found = replace(found, curve=measured(fitting, found))
     return sheet, found
+
+
+def _searched(fitting: Fitting, progress: Progress) -> Search:
+    """Return the fits of sets of effects, and another value of the sheet where only that explains.
+
+    Where one value does, one effect may do so too; more of them are no rivals.
+    """
+    progress("parameters only")
+    plain = parameters_only(fitting)
+    if plain.rms <= AT_NOISE * fitting.noise:
+        return search(fitting, plain, progress)
+    progress("other values in the data sheet")
+    wrong = misstated(fitting, plain)
+    if wrong is None:
+        return search(fitting, plain, progress)
+    found = search(fitting, plain, progress, most=1)
+    if verdict(fitting.sheet, found, fitting.noise) != "unexplained":
+        return found
+    return replace(found, misstated=wrong)
 
 
 def _as_found(sheet: ActuatorSheet, found: Search) -> ActuatorSheet:

@@ -60,17 +60,21 @@ class Search:
         return self.curve or self.chosen
 
 
-def search(fitting: Fitting, progress: Progress) -> Search:
+def parameters_only(fitting: Fitting) -> Fitted:
+    """Return the fit without effects."""
+    return fitting.fit((), Begin(drawn=RANDOM_STARTS_ALONE))
+
+
+def search(fitting: Fitting, plain: Fitted, progress: Progress, most: int = MOST_EFFECTS) -> Search:
     """Add and drop single effects, from none on, while that leads to sets of more evidence.
 
     The sets with the most evidence are fitted once more from each other's machines. Of those as
     good as the best one that with the fewest parameters is chosen; where parameters alone are at
     the noise of the pressure, one that is much more probable, or none.
+    plain: the fit without effects. most: effects that are asked for in one machine.
     """
-    progress("parameters only")
     noise = fitting.noise
-    plain = fitting.fit((), Begin(drawn=RANDOM_STARTS_ALONE))
-    tried = _climbed(fitting, plain, progress)
+    tried = _climbed(fitting, plain, progress, most)
     progress("the best from each other's machines")
     good = _first(tried.values(), SETS_SETTLED)
     begin = Begin([f.machine for f in good], drawn=RANDOM_STARTS, thorough=True)
@@ -92,7 +96,9 @@ def search(fitting: Fitting, progress: Progress) -> Search:
     return Search(plain, chosen, tuple(ordered), tuple(rivals), unseen)
 
 
-def _climbed(fitting: Fitting, plain: Fitted, progress: Progress) -> dict[frozenset[str], Fitted]:
+def _climbed(
+    fitting: Fitting, plain: Fitted, progress: Progress, most: int
+) -> dict[frozenset[str], Fitted]:
     """Return the sets tried from parameters only on, until the best ones' neighbours all are."""
     tried = {_key(plain): plain}
     left: set[frozenset[str]] = set()  # sets whose neighbours have been tried
@@ -105,7 +111,7 @@ def _climbed(fitting: Fitting, plain: Fitted, progress: Progress) -> dict[frozen
         for parent in parents:
             progress(f"beside: {parent.name}")
             left.add(_key(parent))
-            found = _neighbours(fitting, parent, tried)
+            found = _neighbours(fitting, parent, tried, most)
             tried |= {_key(f): f for f in found}
         best = _first(tried.values(), 1)[0]
 
@@ -187,11 +193,11 @@ def _probable(fitted: Fitted) -> float:
 
 
 def _neighbours(
-    fitting: Fitting, parent: Fitted, tried: dict[frozenset[str], Fitted]
+    fitting: Fitting, parent: Fitted, tried: dict[frozenset[str], Fitted], most: int
 ) -> list[Fitted]:
     """Fit the sets with one effect more or less; the better half again from further starts."""
     sets = [_key(parent) ^ {name} for name in REGISTRY]
-    new = [s for s in sets if s not in tried and len(s) <= MOST_EFFECTS]
+    new = [s for s in sets if s not in tried and len(s) <= most]
     ordered = [tuple(name for name in REGISTRY if name in s) for s in new]
     begin = Begin([parent.machine], levels=True)
     first = side_by_side(lambda effects: fitting.fit(effects, begin), ordered)

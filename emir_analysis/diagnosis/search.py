@@ -8,7 +8,12 @@ import numpy as np
 from emir_analysis.diagnosis.backward_elimination import BackwardElimination
 from emir_analysis.diagnosis.drift import Drift, drift
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, following
+from emir_analysis.diagnosis.fitting import (
+    fit_balances,
+    fit_free_run,
+    following,
+    refine_free_run,
+)
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.loads import LOAD
@@ -17,6 +22,7 @@ from emir_analysis.diagnosis.rounds import Rounds, Tried, free
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
+    EXPLAINED,
     HOPELESS,
     LEFT,
     SEEN,
@@ -81,9 +87,7 @@ class Search:
 
     def run(self) -> list[Trial]:
         """Return the best trial and those that are as good."""
-        errors = free_run_errors(self.refitted.machine, self._evidence)
-        left = column_rms(np.concatenate(errors))  # NaN where there is no free run
-        if np.all(left <= AT_NOISE) and leaves_quiet(self.balanced, self._evidence):
+        if self._nothing_left():
             self._rounds.tried = [self._rounds.scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain
         plain = self._rounds.scored(self._plain(), free_run_score(self.refitted, self._evidence))
@@ -107,6 +111,23 @@ class Search:
         if needed is not equal[0]:
             equal = self._equal.get(needed.effects, [needed])
         return self._rivals_on_the_whole(equal)
+
+    def _nothing_left(self) -> bool:
+        """Tell whether the parameters alone bring everything to the noise.
+
+        Where they come near, once they are fitted to the end.
+        """
+        if not leaves_quiet(self.balanced, self._evidence):
+            return False
+        near = self._excess(self.refitted) < beyond(EXPLAINED)
+        if near and not self._each_at_noise(self.refitted):
+            self.refitted = refine_free_run(self.refitted, self._evidence)
+        return self._each_at_noise(self.refitted)
+
+    def _each_at_noise(self, one: Trial) -> bool:
+        """Tell whether the free run of each signal is at the noise; it is not where it is none."""
+        errors = free_run_errors(one.machine, self._evidence)
+        return bool(np.all(column_rms(np.concatenate(errors)) <= AT_NOISE))
 
     def _with_others_in_place(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trials with other effects in place of some of several, where better.

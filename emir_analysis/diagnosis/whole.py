@@ -143,12 +143,14 @@ class Whole:
         """Return a trial fitted again from none and all of its shares, where that is better.
 
         A share may have been led to the wrong place while another effect was missing. One that
-        does nothing there, as the direction of a force that is all on the piston, leads nowhere.
+        does next to nothing, as the direction of a force that is all on the piston, or is there
+        already, leads nowhere.
         """
         for k, unknown in enumerate(fitted.unknowns.members):
             for end in (unknown.low, unknown.high) if unknown.is_share else ():
                 begun = fitted.at(moved(fitted.x, [k], [end]))
-                if self._excess(fitted) > beyond(LEFT) and self.score(begun) != self.score(fitted):
+                elsewhere = abs(self.score(begun) - self.score(fitted)) > STRONG
+                if elsewhere and self._excess(fitted) > beyond(LEFT):
                     begun = glimpsed(begun, self._evidence)
                     if self.score(begun) < self.score(fitted) - STRONG:
                         fitted = refine_free_run(begun, self._evidence)

@@ -750,6 +750,20 @@ def test_a_healthy_machine_keeps_no_effect() -> None:
     assert needed(begun[0], fitted(begun, "viscous_friction")).effects == ()
 
 
+def test_parameters_are_fitted_to_the_end_before_an_effect_is_asked_about() -> None:
+    """A fit of parameters that leaves a little lacks nothing but its end."""
+    searched, _, evidence = search({})
+    off = searched.refitted
+    while at_noise(off, evidence):
+        off = off.at(off.x + np.where(off.unknowns.toleranced, 0.01, 0.0))
+    assert mean_square(off, evidence) < EXPLAINED**2
+    searched.refitted = off
+    (found,) = searched.run()
+    assert found.effects == ()
+    assert at_noise(found, evidence)
+    assert len(searched.tried) == 1
+
+
 def test_one_effect_stays_as_the_balances_say_while_another_drives_the_free_run_away() -> None:
     """Soft hoses on a valve that lowers a tenth slower: fitted to the free run alone they are off.
 

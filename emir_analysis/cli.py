@@ -1,6 +1,7 @@
 """The `emir` command."""
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from emir_analysis.errors import IncompleteError, InputError
+from emir_analysis.unused_options import check_unused
 from emir_common.quantity import ParameterError
 
 USAGE = """usage: emir COMMAND ...
@@ -35,6 +37,7 @@ USAGE = """usage: emir COMMAND ...
 `emir COMMAND --help` tells more."""
 
 HELP = ("--help", "-h")
+TIME_LIMIT = 180.0  # s: three times what a diagnosis of 90 s takes at most, but for a few
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -232,7 +235,7 @@ def _diagnose(words: list[str]) -> int:
         return _diagnose_actuator(o)
     return _said(summary, lambda: command(
         o.bag, o.datasheet, o.signals, o.judge, o.json, o.html, _progress,
-        model_out=o.model_out, predictions=o.predictions,
+        model_out=o.model_out, predictions=o.predictions, time_limit=o.time_limit,
     ))  # fmt: skip
 
 
@@ -241,6 +244,7 @@ def _diagnose_actuator(o: argparse.Namespace) -> int:
 
     if o.signals is None:
         raise InputError(f"{o.datasheet}: an actuator needs --signals")
+    check_unused(o, {"time_limit": TIME_LIMIT}, "an actuator's search ends soon in any case")
     judges = o.judge or [None]
     if len(o.bag) > 1 or len(judges) > 1:
         raise InputError(
@@ -284,7 +288,22 @@ def _diagnose_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--predictions", type=Path, metavar="DIR", help="write the simulated runs as MCAP"
     )
+    parser.add_argument(
+        "--time-limit", type=_seconds, default=TIME_LIMIT, metavar="S",
+        help="after which the search ends with the best that was found (default: %(default)g)",
+    )  # fmt: skip
     return parser
+
+
+def _seconds(word: str) -> float:
+    """Return a time, s. Raises ArgumentTypeError unless it is one."""
+    try:
+        seconds = float(word)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise argparse.ArgumentTypeError(f"{word}: not a time in seconds above 0")
+    return seconds
 
 
 def _said(summary: Callable[[Any], str], work: Callable[[], object]) -> int:

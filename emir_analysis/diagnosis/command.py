@@ -1,5 +1,6 @@
 """The diagnosis of recordings in files, as the `emir diagnose` command calls it."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -41,6 +42,7 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     *,
     model_out: Path | None = None,
     predictions: Path | None = None,
+    time_limit: float = math.inf,
 ) -> Diagnosis:
     """Find out from the recordings `bag` what the data sheet's machine lacks.
 
@@ -48,7 +50,8 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     signals to topics, the graph's when not given. judge: recordings on which the errors are stated,
     opened when everything is fitted; `bag` itself when not given. json, html: files to write.
     model_out: file for the machine as found; a controller designed before and after is then
-    compared on it. predictions: folder for the simulated runs. Raises InputError or
+    compared on it. predictions: folder for the simulated runs. time_limit: s, after which the
+    search ends with the best that was found. Raises InputError or
     ParameterError, one line each, for anything that cannot be used; IncompleteError, with the
     result, where a judge recording or an output cannot.
     """
@@ -64,7 +67,7 @@ def command(  # noqa: PLR0913, PLR0917 - the options of the command, one by one
     sheet, noisier = as_measured(sheet, experiments)
     for line in noisier:
         progress(line)
-    findings = diagnose(experiments, sheet, progress)
+    findings = diagnose(experiments, sheet, progress, time_limit)
     progress(f"judging on {', '.join(map(str, judges)) or 'the same'}")
     opened, failed = _judges(judges, signal_map, sheet.machine, progress)
     judgement = judged(findings, opened or experiments)

@@ -1,5 +1,6 @@
 """The course of a diagnosis: balances, parameters, effects, verdict - from recordings."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limit
 from emir_analysis.diagnosis.shape import Shape, best_shape
 from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.telling import open_shares
+from emir_analysis.diagnosis.time_limit import TimeLimit
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.diagnosis.where import Where, where
@@ -51,6 +53,7 @@ class Findings:
     most of it lies. misstated: parameters with one value of the sheet replaced, their last unknown,
     where that explains what no effect does, the best first; curve: what has no name. With either
     `chosen` and `after` then are. drift: of a size, where that makes most of what is left.
+    stopped: s, after which the search was over before its end, None where it was not.
     """
 
     evidence: Evidence
@@ -73,6 +76,7 @@ class Findings:
     misstated: tuple[Trial, ...]
     curve: Curve | None
     drift: Drift | None
+    stopped: float | None
 
 
 def _known(experiments: Sequence[Experiment], machine: Machine) -> dict[str, float]:
@@ -91,10 +95,18 @@ def _known(experiments: Sequence[Experiment], machine: Machine) -> dict[str, flo
     return known
 
 
-def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress) -> Findings:
-    """Find out from recordings of one machine what its data sheet lacks."""
+def diagnose(
+    experiments: Sequence[Experiment],
+    sheet: Sheet,
+    progress: Progress,
+    time_limit: float = math.inf,
+) -> Findings:
+    """Find out from recordings of one machine what its data sheet lacks.
+
+    time_limit: s, after which the search ends with the best that was found.
+    """
     sheet = replace(sheet, machine=with_values(sheet.machine, _known(experiments, sheet.machine)))
-    evidence = Evidence(experiments, sheet.machine)
+    evidence = Evidence(experiments, sheet.machine, TimeLimit(time_limit))
     search = Search(evidence, sheet, progress)
     best = search.run()
     before, unaided = evidence.residuals([sheet.machine, search.balanced.machine])
@@ -138,6 +150,7 @@ def diagnose(experiments: Sequence[Experiment], sheet: Sheet, progress: Progress
         misstated=doubts.misstated,
         curve=None if instead is None or doubts.misstated else _curve(final, evidence),
         drift=search.drifting if asked else None,
+        stopped=evidence.limit.seconds if evidence.limit.is_over else None,
     )
 
 
@@ -154,7 +167,7 @@ def _named(best: Trial, unaided: Array, search: Search, evidence: Evidence) -> t
     """
     if not best.effects:
         return search.refitted, unaided
-    named = search.whole.plainer(search.whole.fitted(best))
+    named = search.named(best)
     balanced = fit_balances(named, evidence, search.floor)
     return named, evidence.residuals([balanced.machine])[0]
 

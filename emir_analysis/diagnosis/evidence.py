@@ -13,6 +13,7 @@ from emir_analysis.diagnosis.balances import (
     noise_floor,
 )
 from emir_analysis.diagnosis.experiment import OUTPUTS, STROKE, Experiment, noise
+from emir_analysis.diagnosis.time_limit import TimeLimit
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
@@ -24,12 +25,15 @@ class Evidence:
     experiments: all with the same signals. sensors: (4,) the outputs' noise, NaN where an output
     is not known. told: (5,) which balances the signals allow; fitted: (5,) which of them hold
     something that parameters could change: the linkage's only where the stroke has a sensor of
-    its own. complete: all but the linkage's are told.
+    its own. complete: all but the linkage's are told. limit: of the time that fits to them take.
     """
 
-    def __init__(self, experiments: Sequence[Experiment], stated: Machine) -> None:
+    def __init__(
+        self, experiments: Sequence[Experiment], stated: Machine, limit: TimeLimit | None = None
+    ) -> None:
         self.experiments = tuple(experiments)
         self.stated = stated
+        self.limit = limit or TimeLimit()
         self.measured = frozenset.intersection(*(e.measured for e in self.experiments))
         shown = np.array([name in self.measured or name == STROKE for name in OUTPUTS])
         self.sensors = np.where(shown, noise(stated), np.nan)
@@ -58,11 +62,11 @@ class Evidence:
 
     def head(self, share: float) -> "Evidence":
         """Return the first part of every recording."""
-        return Evidence([e.head(share) for e in self.experiments], self.stated)
+        return Evidence([e.head(share) for e in self.experiments], self.stated, self.limit)
 
     def until(self, time: float) -> "Evidence":
         """Return every recording up to a time, s."""
-        return Evidence([e.until(time) for e in self.experiments], self.stated)
+        return Evidence([e.until(time) for e in self.experiments], self.stated, self.limit)
 
     @property
     def time(self) -> Array:

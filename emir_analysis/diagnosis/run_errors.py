@@ -113,7 +113,11 @@ def weighted_errors(
     *,
     coarse: bool = False,
 ) -> Array:
-    """Return weighted errors in units of the noise, one row for each machine."""
+    """Return weighted errors in units of the noise, one row for each machine.
+
+    Raises OutOfTimeError where the evidence's time is over.
+    """
+    evidence.limit.check()
     runs = free_runs(machines, experiment, starts, coarse=coarse)[:, :, COMPARED]
     error = (runs - experiment.outputs) * experiment.weights / evidence.sensors
     return np.asarray(error[:, :, evidence.shown].reshape(len(machines), -1))

@@ -86,7 +86,23 @@ class Search:
         return drift(self.balanced, self._evidence, self.floor)
 
     def run(self) -> list[Trial]:
-        """Return the best trial and those that are as good."""
+        """Return the best trial and those that are as good, or the best until time was over."""
+        return self._evidence.limit.within(self._run, self._so_far)
+
+    def named(self, best: Trial) -> Trial:
+        """Return a trial as it is named: fitted to the whole, without what it does not need."""
+        return self._evidence.limit.within(
+            lambda: self.whole.plainer(self.whole.fitted(best)), lambda: self.whole.better(best)
+        )
+
+    def _so_far(self) -> list[Trial]:
+        """Return the best of all that was fitted."""
+        self._progress("the time is over: the best so far")
+        fitted = [t.trial for t in self.tried if t.free_run is not None]
+        best = min([self.refitted, *self.whole.known(), *fitted], key=self.whole.score)
+        return [best if sticks(best) else refine_free_run(best, self._evidence)]
+
+    def _run(self) -> list[Trial]:
         if self._nothing_left():
             self._rounds.tried = [self._rounds.scored(self.balanced)]
             return [self.refitted]  # nothing is left that an effect could explain

@@ -48,7 +48,17 @@ def statement(findings: Findings, judged: Judged) -> str:
     words = _of_findings(findings)
     if findings.verdict == "nothing_missing" and judged.surprising:
         words = f"of {findings.evidence.name}, {words}"
-    return words + judgement(findings, judged)
+    return words + judgement(findings, judged) + _stopped(findings)
+
+
+def _stopped(findings: Findings) -> str:
+    """Return that the search was over before its end, where that may matter."""
+    if findings.stopped is None or findings.verdict == "nothing_missing":
+        return ""
+    return (
+        f"; the search was stopped after {findings.stopped:g} s, before all was tried: with more"
+        " --time-limit it may find more"
+    )
 
 
 def _of_findings(findings: Findings) -> str:

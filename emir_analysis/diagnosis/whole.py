@@ -237,6 +237,10 @@ class Whole:
         """Take a trial as the one that is fitted with its effects."""
         self._known[fitted.effects] = fitted
 
+    def known(self) -> list[Trial]:
+        """Return all that has been fitted."""
+        return list(self._known.values())
+
     def better(self, fitted: Trial) -> Trial:
         """Return a trial, or the one known with the same effects where that is better."""
         return min(fitted, self._known.get(fitted.effects, fitted), key=self.score)

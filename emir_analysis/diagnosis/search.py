@@ -121,6 +121,7 @@ class Search:
             if not enough:
                 equal = self._two_at_once(plain, best) or equal
             equal = self._with_others_in_place(equal)
+        equal = self.nearest_the_whole(equal)
         needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
@@ -157,6 +158,26 @@ class Search:
             return equal
         better = self._rounds.exchanged(full)
         return self._with_others_in_place(_as_good(better)) if better else equal
+
+    def nearest_the_whole(self, equal: list[Trial]) -> list[Trial]:
+        """Return the best trials, or one with as many other effects that leaves less of the whole.
+
+        Where the best one leaves something, the part held back may have preferred it by chance. Of
+        the others that which is nearest is fitted to the whole as well.
+        """
+        best = equal[0]
+        if not best.effects or sticks(best):
+            return equal
+        if not beyond(LEFT) < self._excess(self.whole.fitted(best)) < beyond(HOPELESS):
+            return equal
+        asked = [t.trial for t in self.tried if t.free_run is not None]
+        alike = [t for t in asked if len(t.effects) == len(best.effects) and not sticks(t)]
+        others = [t for t in alike if set(t.effects) != set(best.effects)]
+        nearest = min(others, key=self.whole.score, default=best)
+        if self._excess(nearest) > beyond(EXPLAINED):
+            return equal
+        limit = self._on_the_whole(best) - STRONG
+        return [nearest] if self._on_the_whole(nearest) < limit else equal
 
     def _rivals_on_the_whole(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trial and those that are as good on the whole, too.

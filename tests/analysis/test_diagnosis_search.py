@@ -28,6 +28,7 @@ from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
+    HOPELESS,
     SEEN,
     STRONG,
     at_noise,
@@ -561,6 +562,18 @@ def test_a_rival_is_as_good_on_the_whole() -> None:
     right, wrong = fitted(begun, "viscous_friction"), fitted(begun, "payload")
     more = fitted(begun, "viscous_friction", "valve_null_offset")
     assert begun[0]._rivals_on_the_whole([right, wrong, more]) == [right, more]
+
+
+def test_what_leaves_less_of_the_whole_is_taken_where_something_is_left() -> None:
+    """The part held back has preferred a payload to friction, by chance."""
+    begun = search({"effects.viscous_friction.coefficient": 5e4})
+    searched, sheet, evidence = begun
+    wrong, right = fitted(begun, "payload"), fitted(begun, "viscous_friction")
+    assert AT_NOISE < math.sqrt(mean_square(wrong, evidence)) < HOPELESS
+    tried = fit_free_run(trial(sheet, ("viscous_friction",)), evidence.head(SEEN))
+    searched.tried.append(Tried(tried, 0.0, free_run_score(tried, evidence)))
+    assert searched.nearest_the_whole([wrong]) == [tried]
+    assert searched.nearest_the_whole([right]) == [right]
 
 
 def test_what_is_needed_stays() -> None:

@@ -160,7 +160,7 @@ class Search:
         return self._with_others_in_place(_as_good(better)) if better else equal
 
     def nearest_the_whole(self, equal: list[Trial]) -> list[Trial]:
-        """Return the best trials, or one with as many other effects that leaves less of the whole.
+        """Return the best trials, or other effects that leave less of the whole: as many of them.
 
         Where the best one leaves something, the part held back may have preferred it by chance. Of
         the others that which is nearest is fitted to the whole as well.

@@ -37,7 +37,7 @@ USAGE = """usage: emir COMMAND ...
 `emir COMMAND --help` tells more."""
 
 HELP = ("--help", "-h")
-TIME_LIMIT = 240.0  # s: four times what a diagnosis of 90 s takes at most, but for a few
+TIME_LIMIT = 240.0  # s: four times what a diagnosis from 90 s takes, but for a few machines
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

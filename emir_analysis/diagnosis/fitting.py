@@ -41,8 +41,7 @@ POLISHED = 2.0  # RMS error in units of the noise beyond which flat directions d
 HOPELESS_ACCURACY = 0.1  # relative
 BEHIND = 1.5  # times the error of what a trial has to beat: further off, a fine fit changes nothing
 GLIMPSE = 8  # evaluations of a fit that may lead nowhere
-GROWING = (0.08, 0.25, 0.4, 0.65)  # shares of a recording to which is fitted first: a swing that
-# goes on for three times as long is lost
+GROWING = (0.08, 0.25)  # shares of a recording to which the free run is fitted before the whole
 FREE_RUN_STEP = 3e-2  # as fit.DIFFERENCE_STEP, of a free run: sticking makes it rough
 SHORTEST_FOLLOWED, FOLLOWED_GROWTH = 5.0, 1.5  # s, and times, of a beginning that grows
 BEGINNING_EXPLAINED = 1.15  # RMS error in units of the noise, the most

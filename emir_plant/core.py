@@ -4,7 +4,6 @@ The state vector holds the hydraulic states at the indices named here, then time
 of effects, then the boom's modal coordinates and then their rates.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from emir_plant.effects import (
     valve_hysteresis,
     viscous_friction,
 )
+from emir_plant.elementary import cosine
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled, compiled_in_place
@@ -228,7 +228,7 @@ def _write_boom(x: Array, motion: Motion, dry: float, p: Any, dx: Array) -> None
     beside = unnamed + external_load.on_piston(load, p)
     torque = (motion.force + beside - friction) * motion.arm
     torque += external_load.about_joint(load, p)
-    gravity = math.cos(motion.angle)
+    gravity = cosine(motion.angle)
     across = external_load.at_tip(load, motion.angle, p)
     for i in range(n):
         dx[MODES + i] = x[MODES + n + i]
@@ -268,5 +268,5 @@ def truth_of(x: Array, p: Any) -> Truth:
         flow_lowering,
         x[SPOOL],
         x[LOGIC],
-        bending + p.residual_sag * math.cos(motion.angle) + p.residual_compliance * load,
+        bending + p.residual_sag * cosine(motion.angle) + p.residual_compliance * load,
     )

@@ -16,3 +16,17 @@ def square_root(_context: Any, _argument: Any) -> Any:
         return builder.call(root, arguments)
 
     return numba.float64(numba.float64), generate
+
+
+@intrinsic
+def power_of_two(_context: Any, _argument: Any) -> Any:
+    """Return 2 to a whole number within -1022 to 1023: the bits of its exponent."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        whole = builder.fptosi(arguments[0], ir.IntType(64))
+        exponent = builder.shl(
+            builder.add(whole, ir.Constant(whole.type, 1023)), ir.Constant(whole.type, 52)
+        )
+        return builder.bitcast(exponent, ir.DoubleType())
+
+    return numba.float64(numba.float64), generate

@@ -106,7 +106,8 @@ def on_all_cores(work: Callable[[int], None], number: int) -> None:
         list(pool.map(work, range(number)))  # the list, so that it raises
 
 
-_instruction = OnFirstUse(lambda: import_module("emir_plant.instructions").square_root)
+_square_root = OnFirstUse(lambda: import_module("emir_plant.instructions").square_root)
+_power_of_two = OnFirstUse(lambda: import_module("emir_plant.instructions").power_of_two)
 
 
 @compiled
@@ -115,5 +116,12 @@ def square_root(number: float) -> float:
 
     One instruction; `math.sqrt` asks the C library whenever the number may be negative.
     """
-    root: float = _instruction(number)
+    root: float = _square_root(number)
     return root
+
+
+@compiled
+def power_of_two(exponent: float) -> float:
+    """Return 2 to a whole number within -1022 to 1023; `2.0**exponent` asks the C library."""
+    power: float = _power_of_two(exponent)
+    return power

@@ -1,9 +1,9 @@
-"""Many machines at a time: without effects in the lanes of the processor's vector registers.
+"""Many machines at a time, in the lanes of the processor's vector registers.
 
-The right-hand side of `core.py` then runs in a loop over LANES machines, which the compiler
-turns into vector instructions; every number comes out as it does for a machine by itself. With
-effects no such loop can be had: each has branches and functions of its own. Those machines run
-one by one.
+The right-hand side of `core.py` runs in a loop over LANES machines, which the compiler turns into
+vector instructions; every number comes out as it does for a machine by itself. Both ways of every
+branch are gone there, which takes that none calls the C library and none has a memory or steps of
+its own. Machines with effects that do run one by one.
 """
 
 import math
@@ -13,12 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_plant import core, integration
-from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, Array
+from emir_plant.core import COLUMNS, DELAY_LINE, MODES, P_S, PLAYED, Array
+from emir_plant.effects import valve_hysteresis
 from emir_plant.jit import compiled_in_place, on_all_cores
 from emir_plant.lane import lane
 from emir_plant.record import EFFECT_FIELDS, EFFECT_SIZES
 
 LANES = 8  # doubles in the widest registers there are
+ONE_BY_ONE = (  # what the names begin with of effects that
+    "coulomb_friction",  # have steps of their own, as all dry friction,
+    "stribeck_friction",
+    "pressure_dependent_friction",
+    "unnamed",
+    "backlash",
+    "command_delay",  # a memory longer than a number,
+    "entrained_air",  # or a power
+)
+ANY = ("",)
 STAGES = ("k1", "k2", "k3", "k4", "between")
 
 
@@ -36,22 +47,39 @@ def simulate_many(  # noqa: PLR0913, PLR0917 (as integration.simulate)
     step: s, the longest of the integration. Returns (m, 1 + k // every, len(Truth)) as
     `integration.simulate` gives it for each, bit by bit.
     """
-    if len(starts) < LANES or any(parameters[name].any() for name in EFFECT_SIZES):
+    together = ~_have(ONE_BY_ONE, parameters)
+    if np.sum(together) < LANES:
         return integration.simulate_each(starts, commands, dt, every, parameters, step)
-    groups = _side_by_side(starts, parameters)
-    found = np.empty((groups.size, LANES, 1 + commands.size // every, COLUMNS))
+    result = np.empty((len(starts), 1 + commands.size // every, COLUMNS))
+    alone = starts[~together], commands, dt, every, parameters[~together], step
+    result[~together] = integration.simulate_each(*alone)
+    groups = _side_by_side(starts[together], parameters[together])
+    found = np.empty((groups.size, LANES, *result.shape[1:]))
 
     def run(group: int) -> None:
         _simulate(groups[group : group + 1], commands, dt, every, step, found[group])
 
     on_all_cores(run, groups.size)
-    return found.reshape(-1, *found.shape[2:])[: len(starts)]
+    result[together] = found.reshape(-1, *result.shape[1:])[: np.sum(together)]
+    return result
+
+
+def _have(effects: tuple[str, ...], parameters: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell which machines, (m,) records, have an effect whose name begins with one of these."""
+    sizes = [name for name in EFFECT_SIZES if name.startswith(effects)]
+    return np.asarray(np.any([parameters[name] != 0.0 for name in sizes], axis=0))
 
 
 def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
-    """Return records of LANES machines each, effects left out; the last one fills up the rest."""
+    """Return records of LANES machines each; the last one fills up the rest.
+
+    Without the fields of any effect where no machine has one: that is compiled by itself, and runs
+    in half the time.
+    """
     groups, size = -(-len(starts) // LANES), starts.shape[1] * LANES
-    kept = [name for name in parameters.dtype.names or () if name not in EFFECT_FIELDS]
+    effects = ONE_BY_ONE if _have(ANY, parameters).any() else ANY
+    left_out = [name for name in EFFECT_FIELDS if name.startswith(effects)]
+    kept = [name for name in parameters.dtype.names or () if name not in left_out]
     layout = [(name, np.float64, (*parameters.dtype[name].shape, LANES)) for name in kept]
     layout += [(name, np.float64, (size,)) for name in ("state", *STAGES)]
     machines = np.zeros(groups, layout)
@@ -63,10 +91,10 @@ def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
 
 
 @compiled_in_place
-def _write_rates(machines: Any, x: Array, command: float, dx: Array) -> None:
+def _write_rates(m: Any, x: Array, dx: Array) -> None:
     for i in range(LANES):
-        p = lane(machines, i)
-        core.write_derivative_of(x[i::LANES], command, p, dx[i::LANES])
+        command = m.state[PLAYED * LANES + i]
+        core.write_derivative_of(x[i::LANES], command, lane(m, i), dx[i::LANES])
 
 
 @compiled_in_place
@@ -83,13 +111,16 @@ def _write_sum(x: Array, h: float, rates: Array, result: Array) -> None:
 def _step(m: Any, command: float, h: float) -> None:
     """Advance the machines m by one step of Runge-Kutta 4, as `core` does without friction."""
     x, k1, k2, k3, k4, between = m.state, m.k1, m.k2, m.k3, m.k4, m.between
-    _write_rates(m, x, command, k1)
+    for i in range(LANES):
+        k = PLAYED * LANES + i
+        x[k] = valve_hysteresis.played(command, x[k], lane(m, i))
+    _write_rates(m, x, k1)
     _write_sum(x, 0.5 * h, k1, between)
-    _write_rates(m, between, command, k2)
+    _write_rates(m, between, k2)
     _write_sum(x, 0.5 * h, k2, between)
-    _write_rates(m, between, command, k3)
+    _write_rates(m, between, k3)
     _write_sum(x, h, k3, between)
-    _write_rates(m, between, command, k4)
+    _write_rates(m, between, k4)
     for i in range(DELAY_LINE * LANES):
         x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     for k in range(x.size - MODES * LANES):
@@ -97,6 +128,8 @@ def _step(m: Any, command: float, h: float) -> None:
         x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     for i in range((P_S + 1) * LANES):
         x[i] = max(x[i], 0.0)  # p_H and p_S
+    for i in range(LANES):
+        integration.remember(x[i::LANES], lane(m, i))
 
 
 @compiled_in_place

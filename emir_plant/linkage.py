@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from emir_plant.elementary import cosine, sine
 from emir_plant.jit import compiled, square_root
 
 Array = NDArray[np.float64]
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 @compiled
 def third_side(a: float, b: float, enclosed: float) -> float:
     """Return a triangle's third side, m, from two, m, and the angle that they enclose, rad."""
-    return square_root(a * a + b * b - 2.0 * a * b * math.cos(enclosed))
+    return square_root(a * a + b * b - 2.0 * a * b * cosine(enclosed))
 
 
 @compiled
@@ -36,8 +37,8 @@ def stroke(angle: float, p: Any) -> float:
 @compiled
 def lever_arm(angle: float, p: Any) -> float:
     """Return r = dh/dalpha, m, at the boom angle, rad."""
-    sine = math.sin(angle + p.triangle_gamma0)
-    return p.triangle_a * p.triangle_b * sine / cylinder_length(angle, p)
+    across = p.triangle_b * sine(angle + p.triangle_gamma0)
+    return p.triangle_a * across / cylinder_length(angle, p)
 
 
 @compiled

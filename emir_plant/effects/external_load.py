@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.elementary import cosine, exponential
 from emir_plant.jit import compiled
 
 
@@ -68,8 +69,8 @@ def force(time: float, p: Any) -> float:
     share = _risen(since, p.external_load_rise)
     share -= _risen(since - p.external_load_duration, p.external_load_rise)
     angle = 2.0 * math.pi * p.external_load_frequency * since + p.external_load_phase
-    swing = p.external_load_force * math.exp(-p.external_load_decay * max(since, 0.0))
-    return share * (p.external_load_mean + swing * math.cos(angle))
+    swing = p.external_load_force * exponential(-p.external_load_decay * max(since, 0.0))
+    return share * (p.external_load_mean + swing * cosine(angle))
 
 
 @compiled
@@ -78,7 +79,7 @@ def at_tip(load: float, angle: float, p: Any) -> float:
 
     angle: of the boom to the horizontal, rad.
     """
-    across = 1.0 - p.external_load_vertical_share * (1.0 - math.cos(angle))
+    across = 1.0 - p.external_load_vertical_share * (1.0 - cosine(angle))
     beside = (1.0 - p.external_load_piston_share) * (1.0 - p.external_load_joint_share)
     return beside * across * load
 

@@ -1,11 +1,11 @@
 """A valve whose gain changes along the run, as the oil warms up."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
+from emir_plant.elementary import exponential
 from emir_plant.jit import compiled
 
 MINUTE = 60.0  # s
@@ -37,5 +37,11 @@ def gain(time: float, p: Any) -> float:
     if p.flow_gain_drift_change == 0.0:
         return 1.0
     warming = p.flow_gain_drift_time_constant
-    share = math.expm1(-time / warming) / math.expm1(-MINUTE / warming)
+    share = _warmed(time, warming) / _warmed(MINUTE, warming)
     return max(1.0 + p.flow_gain_drift_change * share, 0.0)
+
+
+@compiled
+def _warmed(time: float, time_constant: float) -> float:
+    """Return how far the oil has warmed up at a time, s, as a share of all."""
+    return 1.0 - exponential(-time / time_constant)

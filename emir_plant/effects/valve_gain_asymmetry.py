@@ -28,6 +28,5 @@ class ValveGainAsymmetry(Effect):
 @compiled
 def gain(opening: float, p: Any) -> float:
     """Return the factor on an opening as stated, at the inlet."""
-    if opening > 0.0:
-        return 1.0 + p.valve_gain_asymmetry_lifting
-    return 1.0 + p.valve_gain_asymmetry_lowering
+    lifting, lowering = p.valve_gain_asymmetry_lifting, p.valve_gain_asymmetry_lowering
+    return 1.0 + (lifting if opening > 0.0 else lowering)

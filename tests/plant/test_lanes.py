@@ -7,6 +7,7 @@ import pytest
 
 from emir_common.parameter_tree import with_values
 from emir_plant.core import Truth
+from emir_plant.effects import REGISTRY
 from emir_plant.lanes import LANES, simulate_many
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
@@ -35,7 +36,7 @@ def _machines(count: int) -> list[Plant]:
 def _together(plants: list[Plant]) -> tuple[np.ndarray, np.ndarray]:
     """Return their runs at the same time, and one after the other."""
     starts = np.array(
-        [plant.initial(math.radians(30.0 + 3.0 * k), 2e6) for k, plant in enumerate(plants)]
+        [plant.initial(math.radians(30.0 + 1.5 * k), 2e6) for k, plant in enumerate(plants)]
     )
     records = np.concatenate([plant.record for plant in plants])
     each = [
@@ -60,3 +61,19 @@ def test_one_machine_with_an_effect_keeps_it() -> None:
     without, _ = _together(plants)
     assert np.abs(together[5] - without[5])[:, PRESSURE].max() > 1e4
     assert np.array_equal(np.delete(together, 5, axis=0), np.delete(without, 5, axis=0))
+
+
+def test_machines_with_every_effect_run_beside_each_other() -> None:
+    """One with each of the registry's at the sizes of a first trial, and two without."""
+    trials = [
+        {f"effects.{effect}.{name}": value for name, value in kind.trial.items()}
+        for effect, kind in REGISTRY.items()
+    ]
+    healthy = _machines(LANES)
+    plants = [
+        Plant(with_values(healthy[k % LANES].machine, values))
+        for k, values in enumerate([{}, *trials, {}])
+    ]
+    together, each = _together(plants)
+    assert np.isfinite(each).all()
+    assert np.array_equal(together, each)

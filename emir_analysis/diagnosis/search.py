@@ -38,6 +38,7 @@ from emir_analysis.diagnosis.stick_slip import OFF
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
+from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 MOST_EFFECTS = 3  # that are looked for in one machine
@@ -120,8 +121,8 @@ class Search:
         if enough or not (self.misstated.better_than(best.trial) or self.drifting):
             if not enough:
                 equal = self._two_at_once(plain, best) or equal
-            equal = self._with_others_in_place(equal)
-        equal = self.nearest_the_whole(equal)
+            equal = self._with_others_in_place(self.nearest_the_whole(equal))
+            equal = self.nearest_the_whole(equal)
         needed = self.elimination.needed(equal[0], self.refitted)
         if equal[0].effects and not needed.effects:  # beside none the whole may know more
             return self._by_whole(self.refitted) or [needed]
@@ -160,15 +161,18 @@ class Search:
         return self._with_others_in_place(_as_good(better)) if better else equal
 
     def nearest_the_whole(self, equal: list[Trial]) -> list[Trial]:
-        """Return the best trials, or other effects that leave less of the whole: as many of them.
+        """Return the best trials, or other effects that explain the whole better: as many of them.
 
-        Where the best one leaves something, the part held back may have preferred it by chance. Of
-        the others that which is nearest is fitted to the whole as well.
+        Where the best one leaves something, the part held back may have preferred it by chance, and
+        a series has terms enough to stand for another effect. Of the others that which is nearest
+        is fitted to the whole as well.
         """
         best = equal[0]
         if not best.effects or sticks(best):
             return equal
-        if not beyond(LEFT) < self._excess(self.whole.fitted(best)) < beyond(HOPELESS):
+        left = self._excess(self.whole.fitted(best))
+        series = any(REGISTRY[effect].is_series for effect in best.effects)
+        if left >= beyond(HOPELESS) or not (series or left > beyond(LEFT)):
             return equal
         asked = [t.trial for t in self.tried if t.free_run is not None]
         alike = [t for t in asked if len(t.effects) == len(best.effects) and not sticks(t)]
@@ -176,8 +180,9 @@ class Search:
         nearest = min(others, key=self.whole.score, default=best)
         if self._excess(nearest) > beyond(EXPLAINED):
             return equal
-        limit = self._on_the_whole(best) - STRONG
-        return [nearest] if self._on_the_whole(nearest) < limit else equal
+        plainer = self.whole.plainer if series else lambda full: full
+        scores = [self.whole.score(plainer(self.whole.fitted(t))) for t in (best, nearest)]
+        return [nearest] if scores[1] < scores[0] - STRONG else equal
 
     def _rivals_on_the_whole(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trial and those that are as good on the whole, too.

@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.trial import Trial, moved
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
+from emir_plant.parameters import Machine
 
 OWN_FIELDS_ACCURACY = 1e-2  # relative; what is promising is fitted again with all parameters
 SIZES_TRIED = (1.0, -1.0, 4.0, -4.0, 16.0, -16.0)  # times the trial sizes; a fit starts at the best
@@ -52,6 +53,7 @@ class Left:
     def __init__(self, known: Trial, missing: Missing, step: float) -> None:
         self.step_size = step
         self._missing = missing
+        self._costs = dict[Machine, float]()  # of what was simulated
         # what shapes an effect stays: an onset leads nowhere along a straight line
         free = np.array([not unknown.shapes for unknown in known.unknowns.members], dtype=bool)
         stated, x = known.unknowns.toleranced[free], known.x[free]
@@ -83,13 +85,25 @@ class Left:
         x[:, self._free] = np.clip(self._known[self._free] + changes, *self._bounds)
         return residuals + changes @ self._triangle.T @ self._basis.T, x
 
+    def costs(self, trials: list[Trial]) -> list[float]:
+        """Return what trials leave with their own parameters: half the sum of soft squares."""
+        new = [t for t in trials if t.machine not in self._costs]
+        if new:
+            self._left_by(new)
+        return [self._costs[t.machine] for t in trials]
+
     def runs(self, one: Trial) -> bool:
         """Tell whether a trial's machine can rest where the recordings begin, and be simulated."""
-        return bool(np.all(np.isfinite(self._missing([one]))))
+        return bool(np.all(np.isfinite(self._left_by([one]))))
+
+    def _left_by(self, trials: list[Trial]) -> Array:
+        residuals = self._missing(trials)
+        self._costs |= {t.machine: soft(row) for t, row in zip(trials, residuals, strict=True)}
+        return residuals
 
     def _augmented(self, trials: list[Trial]) -> Array:
         drawn = np.tile(self._drawn, (len(trials), 1))
-        return np.column_stack([self._missing(trials), drawn])
+        return np.column_stack([self._left_by(trials), drawn])
 
 
 class Candidate:
@@ -176,11 +190,10 @@ class Candidate:
         first = np.unique(costs, return_index=True)[1]
         return [points[k] for k in sorted(first)]
 
-    def stepped(self, missing: Missing) -> Screened:
+    def stepped(self) -> Screened:
         """Return the trial where it is best on the way to what is best to first order.
 
         Or at one of the sizes that are usual for it: first order says nothing of a large one.
-        missing: trials -> (m, n), what they leave with their own parameters.
         """
         goal = self._with_parameters(self._reached)
         low, high = self._start.unknowns.bounds
@@ -192,7 +205,7 @@ class Candidate:
         starts = starting_fields(self.effect, self._further, [], 1.0)
         points += [np.append(known, own) for own in starts]
         ways = [self._start.at(np.clip(point, low, high)) for point in points]
-        costs = [soft(row) for row in missing(ways)]
+        costs = self._left.costs(ways)
         best = int(np.argmin(costs))
         return Screened(ways[best], costs[best])
 

@@ -90,13 +90,12 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     By the free run, for a known trial whose balances are quiet: the step that is best to first
     order promises too much far from there, so it is simulated, and shorter ones too.
     """
-    missing = in_free_run(known, evidence)
-    left = Left(known, missing, FREE_RUN_STEP)
+    left = Left(known, in_free_run(known, evidence), FREE_RUN_STEP)
     loads = _by_balance(known, evidence)
     if not evidence.told[FORCE]:
         loads += _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
-    stepped = side_by_side(lambda c: c.stepped(missing), begun)
+    stepped = side_by_side(Candidate.stepped, begun)
     return sorted(stepped, key=lambda s: s.cost)
 
 
@@ -106,11 +105,10 @@ def screen_faint_load(known: Trial, sheet: Sheet, evidence: Evidence) -> Screene
     As `screen_free_run`, for one that may be less than the noise of the balance of forces; that
     takes as long as all other effects together.
     """
-    missing = in_free_run(known, evidence)
-    left = Left(known, missing, FREE_RUN_STEP)
+    left = Left(known, in_free_run(known, evidence), FREE_RUN_STEP)
     loads = _by_free_run(known, sheet, evidence, left)
     (begun,) = _begun(known, sheet, loads, left, SMALL, (LOAD,))
-    return begun.stepped(missing)
+    return begun.stepped()
 
 
 def _by_balance(known: Trial, evidence: Evidence) -> list[Load]:

@@ -102,6 +102,27 @@ def test_a_machine_that_runs_away_leaves_the_parameters_as_they_are() -> None:
     assert np.max(residuals[1]) >= 1e171
 
 
+def test_what_was_simulated_is_not_simulated_again_for_its_cost() -> None:
+    """Half the sum of soft squares of what trials leave as they are, in their order."""
+    members = unknowns(Sheet(joint1(), {"cylinder.beta": 0.15}, {}, ()), ("payload",))
+    known = Trial((), members, members.start, np.full((members.start.size,) * 2, np.nan))
+    asked: list[float] = []
+
+    def missing(trials: list[Trial]) -> Array:
+        asked.extend(one.x[0] for one in trials)
+        return np.array([np.full(40, one.x[0] - 0.2) for one in trials])
+
+    first, second, third = (
+        known.at(known.x + step * np.eye(members.start.size)[0]) for step in (0.1, 0.2, 0.3)
+    )
+    left = Left(known, missing, 1e-3)
+    left.inside([third, first])
+    asked.clear()
+    expected = [40.0 * ((1.0 + (x - 0.2) ** 2) ** 0.5 - 1.0) for x in (0.1, 0.2, 0.3)]
+    assert left.costs([first, second, third]) == pytest.approx(expected)
+    assert asked == [second.x[0]]
+
+
 def similar(size: float) -> Machine:
     """Return a machine so many times as long as EMIR, at the same pressures, times and angles.
 

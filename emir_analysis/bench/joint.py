@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.integrate import odeint
 
 from emir_analysis.bench.timing import Contender, Figure, durations, rates
+from emir_common.parameter_tree import with_values
 from emir_plant import core, integration, lanes
 from emir_plant.core import LOGIC, MODES, P_H, P_S, SPOOL, Truth
 from emir_plant.jit import compiled
@@ -36,6 +37,7 @@ Run = Callable[[], Array]
 ERROR = 1e-4
 SAMPLE = 0.02  # s
 PIECES = ((0.0, 0.2), (0.6, 1.0), (0.0, 1.0), (-0.6, 1.0), (0.0, 1.0), (0.15, 0.8))  # y2, s
+AFFECTED = {"effects.external_load.mean": 500.0, "effects.internal_leakage.coefficient": 1e-12}
 REFERENCE_STEP = 1e-5  # s
 STEPS = tuple(SAMPLE / n for n in (3, 4, 5, 6, 8, 10, 20, 40, 80))  # s, of Runge-Kutta
 TOLERANCES = tuple(10.0**-n for n in np.arange(2.0, 9.5, 0.5))  # relative, of LSODA
@@ -226,6 +228,7 @@ def _growth(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
 
     Beside plain C on one core, which does one after the other.
     """
+    affected = Plant(with_values(task.plant.machine, AFFECTED))
     contenders = []
     if c is not None:
 
@@ -235,10 +238,12 @@ def _growth(task: Task, c: PlainC | None, seconds: float) -> list[Figure]:
         contenders.append(Contender("plain C without effects", by_c, task.duration))
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
     for threads in dict.fromkeys((1, most)):
-        for number in (1, 2, 4, 6, 8, 16, 32):
+        on = f" on {threads} core{'s' if threads > 1 else ''}"
+        many = [(f"{n}{on}", n, task.plant) for n in (1, 2, 4, 6, 8, 16, 32)]
+        many += [(f"{n} with effects{on}", n, affected) for n in (1, 8, 16)]
+        for name, number, plant in many:
             starts = np.tile(task.start, (number, 1))
-            machines = np.tile(task.plant.record, number)
-            name = f"{number} on {threads} core{'s' if threads > 1 else ''}"
+            machines = np.tile(plant.record, number)
             run = _many(starts, task.commands, machines, threads)
             clock = time.perf_counter if threads > 1 else time.process_time
             contenders.append(Contender(name, run, number * task.duration, clock=clock))

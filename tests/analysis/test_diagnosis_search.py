@@ -576,6 +576,27 @@ def test_what_leaves_less_of_the_whole_is_taken_where_something_is_left() -> Non
     assert searched.nearest_the_whole([right]) == [right]
 
 
+def test_a_series_gives_way_to_an_effect_that_explains_as_much_by_fewer_numbers() -> None:
+    """Five terms of the linkage's error stand for a soft hose whose pressure no sensor shows."""
+    begun = search({"effects.vessel_compliance.lowering": 3e-12}, without_p_s)
+    searched, sheet, evidence = begun
+    series = fitted(begun, "linkage_error")
+    assert at_noise(series, evidence)
+    tried = fit_free_run(trial(sheet, ("vessel_compliance",)), evidence.head(SEEN))
+    searched.tried.append(Tried(tried, 0.0, free_run_score(tried, evidence)))
+    assert searched.nearest_the_whole([series]) == [tried]
+
+
+def test_a_series_that_is_there_stays() -> None:
+    begun = search({"effects.linkage_error.slope": 0.02}, without_p_s)
+    searched, sheet, evidence = begun
+    series = fitted(begun, "linkage_error")
+    others = [trial(sheet, (name,)) for name in ("vessel_compliance", "payload")]
+    for other in (fit_free_run(each, evidence.head(SEEN)) for each in others):
+        searched.tried.append(Tried(other, 0.0, free_run_score(other, evidence)))
+    assert searched.nearest_the_whole([series]) == [series]
+
+
 def test_what_is_needed_stays() -> None:
     begun = search(FRICTION | SHIFT)
     pair = fitted(begun, "viscous_friction", "valve_null_offset")

@@ -29,7 +29,6 @@ ONE_BY_ONE = (  # what the names begin with of effects that
     "command_delay",  # a memory longer than a number,
     "entrained_air",  # or a power
 )
-ANY = ("",)
 STAGES = ("k1", "k2", "k3", "k4", "between")
 
 
@@ -47,7 +46,7 @@ def simulate_many(  # noqa: PLR0913, PLR0917 (as integration.simulate)
     step: s, the longest of the integration. Returns (m, 1 + k // every, len(Truth)) as
     `integration.simulate` gives it for each, bit by bit.
     """
-    together = ~_have(ONE_BY_ONE, parameters)
+    together = ~_one_by_one(parameters)
     if np.sum(together) < LANES:
         return integration.simulate_each(starts, commands, dt, every, parameters, step)
     result = np.empty((len(starts), 1 + commands.size // every, COLUMNS))
@@ -64,21 +63,16 @@ def simulate_many(  # noqa: PLR0913, PLR0917 (as integration.simulate)
     return result
 
 
-def _have(effects: tuple[str, ...], parameters: NDArray[Any]) -> NDArray[np.bool_]:
-    """Tell which machines, (m,) records, have an effect whose name begins with one of these."""
-    sizes = [name for name in EFFECT_SIZES if name.startswith(effects)]
+def _one_by_one(parameters: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell which machines, (m,) records, have an effect for which they run one by one."""
+    sizes = [name for name in EFFECT_SIZES if name.startswith(ONE_BY_ONE)]
     return np.asarray(np.any([parameters[name] != 0.0 for name in sizes], axis=0))
 
 
 def _side_by_side(starts: Array, parameters: NDArray[Any]) -> NDArray[Any]:
-    """Return records of LANES machines each; the last one fills up the rest.
-
-    Without the fields of any effect where no machine has one: that is compiled by itself, and runs
-    in half the time.
-    """
+    """Return records of LANES machines each; the last one fills up the rest."""
     groups, size = -(-len(starts) // LANES), starts.shape[1] * LANES
-    effects = ONE_BY_ONE if _have(ANY, parameters).any() else ANY
-    left_out = [name for name in EFFECT_FIELDS if name.startswith(effects)]
+    left_out = [name for name in EFFECT_FIELDS if name.startswith(ONE_BY_ONE)]
     kept = [name for name in parameters.dtype.names or () if name not in left_out]
     layout = [(name, np.float64, (*parameters.dtype[name].shape, LANES)) for name in kept]
     layout += [(name, np.float64, (size,)) for name in ("state", *STAGES)]

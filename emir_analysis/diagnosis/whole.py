@@ -186,8 +186,9 @@ class Whole:
             still = fitted.at(x).fixed(start + "mean", 0.0)
         for name in ("frequency", "phase", "decay"):
             still = still.fixed(start + name, 0.0)
-        lasting = fitted.fixed(start + "decay", 0.0)
-        ways = [refine_free_run(still, self._evidence, fitted), lasting]
+        ways = [fitted.fixed(start + "decay", 0.0)]
+        if self._excess(still) <= beyond(HOPELESS):  # else it is no slow swing that is there
+            ways.insert(0, refine_free_run(still, self._evidence, fitted))
         score = self.score(fitted)
         return next((way for way in ways if self.score(way) <= score), fitted)
 

@@ -47,7 +47,7 @@ def _together(plants: list[Plant]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("count", [1, LANES, LANES + 3])
-def test_without_effects_every_bit_is_that_of_a_core_with_effects_of_size_zero(count: int) -> None:
+def test_every_bit_is_that_of_a_machine_by_itself(count: int) -> None:
     together, each = _together(_machines(count))
     assert np.isfinite(each).all()
     assert np.array_equal(together, each)

@@ -46,6 +46,8 @@ class LinkageError(Effect):
 def stroke(angle: float, p: Any) -> float:
     """Return the stroke as built, m, at the boom angle, rad."""
     h, about = linkage.stroke(angle, p), p.linkage_error_about
+    if _is_none(p):
+        return h
     return h + _integral(h - about, p) - _integral(-about, p)
 
 
@@ -60,7 +62,17 @@ def _integral(u: float, p: Any) -> float:
 @compiled
 def lever_arm(angle: float, p: Any) -> float:
     """Return the lever arm dh/dalpha as built, m, at the boom angle, rad."""
+    if _is_none(p):
+        return linkage.lever_arm(angle, p)
     u = linkage.stroke(angle, p) - p.linkage_error_about
     bent = p.linkage_error_curvature + u * (p.linkage_error_cubic + u * p.linkage_error_quartic)
     error = p.linkage_error_scale + u * (p.linkage_error_slope + u * bent)
     return linkage.lever_arm(angle, p) * (1.0 + error)
+
+
+@compiled
+def _is_none(p: Any) -> bool:
+    """Tell whether there is none, for which the terms need not be summed up."""
+    terms = abs(p.linkage_error_scale) + abs(p.linkage_error_slope)
+    terms += abs(p.linkage_error_curvature) + abs(p.linkage_error_cubic)
+    return terms + abs(p.linkage_error_quartic) == 0.0

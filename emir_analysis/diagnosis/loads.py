@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from emir_analysis.signals import Array
+from emir_plant.effects.external_load import ExternalLoad
 
 LOAD = "external_load"  # in the registry
 FASTEST = 0.5  # Hz: faster swings average out over the windows of the force balance
@@ -19,6 +20,7 @@ FEWEST = 8  # windows over which a load has to swing
 SHORTEST = 4  # windows over which a load has to last
 RISES = (2.0, 4.0, 8.0, 16.0, 32.0)  # s, over which a load that stays may come
 FOR_EVER = 1e5  # s
+INSTANTS = 200  # of a mean over time
 WEAK = 1e-9  # relative to what the strongest window's load changes: less is as good as nothing
 
 
@@ -155,3 +157,11 @@ def _swing(frequency: float, parts: Array, begin: float) -> Load:
 def _to_the_end(values: Array) -> Array:
     """Return the sums of rows, (..., w), from each place to the end."""
     return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1]
+
+
+def mean_while_it_acts(load: ExternalLoad, end: float) -> float:
+    """Return a load's mean, N, over what of its time lies in a recording up to its end, s."""
+    begin, end = max(load.start, 0.0), min(load.start + load.duration, end)
+    since = np.linspace(begin, end, INSTANTS) - load.start
+    swing = np.exp(-load.decay * since) * np.cos(2.0 * np.pi * load.frequency * since + load.phase)
+    return load.mean + load.force * float(np.mean(swing))

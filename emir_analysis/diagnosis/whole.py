@@ -1,6 +1,5 @@
 """Trials fitted to the free run of the whole recordings, each set of effects once."""
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -20,7 +19,7 @@ from emir_analysis.diagnosis.friction_laws import (
     without_breakaway,
 )
 from emir_analysis.diagnosis.late_command import late_command
-from emir_analysis.diagnosis.loads import LOAD
+from emir_analysis.diagnosis.loads import LOAD, mean_while_it_acts
 from emir_analysis.diagnosis.next_law import Laws, next_laws
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
@@ -181,14 +180,13 @@ class Whole:
         load, still = fitted.machine.effects.external_load, fitted
         if start + "force" in paths:
             k, x = paths.index(start + "force"), fitted.x.copy()
-            steady = load.force * math.cos(load.phase) + load.mean
-            x[k] = fitted.unknowns.members[k].at(steady)
+            end = max(float(e.time[-1]) for e in self._evidence.experiments)
+            x[k] = fitted.unknowns.members[k].at(mean_while_it_acts(load, end))
             still = fitted.at(x).fixed(start + "mean", 0.0)
         for name in ("frequency", "phase", "decay"):
             still = still.fixed(start + name, 0.0)
-        ways = [fitted.fixed(start + "decay", 0.0)]
-        if self._excess(still) <= beyond(HOPELESS):  # else it is no slow swing that is there
-            ways.insert(0, refine_free_run(still, self._evidence, fitted))
+        lasting = fitted.fixed(start + "decay", 0.0)
+        ways = [refine_free_run(still, self._evidence, fitted), lasting]
         score = self.score(fitted)
         return next((way for way in ways if self.score(way) <= score), fitted)
 

@@ -6,8 +6,20 @@ import numpy as np
 import pytest
 from scipy.signal import lsim, lti
 
-from emir_analysis.diagnosis.loads import FOR_EVER, of_force, of_steps, slow, steady, swings
+from emir_analysis.diagnosis.loads import (
+    FOR_EVER,
+    mean_while_it_acts,
+    of_force,
+    of_steps,
+    slow,
+    steady,
+    swings,
+)
 from emir_analysis.signals import Array
+from emir_common.parameter_tree import with_values
+from emir_plant.effects import external_load
+from emir_plant.plant import Plant
+from emir_plant.sheet import joint1
 
 TIME = np.arange(0.5, 59.5, 0.25)  # s
 OSCILLATOR = lti([1.0], [1.0, 2.0 * 0.02 * 4.4, 4.4**2])  # 0.7 Hz, hardly damped, as the boom
@@ -91,3 +103,22 @@ def test_a_swinging_load_is_seen_through_what_swings_itself() -> None:
     assert late.frequency == pytest.approx(0.3, abs=1.0 / (4.0 * 40.0))
     assert late.begin == pytest.approx(9.0, abs=0.5)
     assert late.force == pytest.approx(300.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("start", "duration", "acts"),
+    [(25.0, 37.0, (25.0, 62.0)), (-5.0, 1e5, (0.0, 90.0)), (40.0, 1e5, (40.0, 90.0))],
+)
+def test_a_load_s_mean_is_that_of_the_machine_s_while_it_acts(
+    start: float, duration: float, acts: tuple[float, float]
+) -> None:
+    """Of a slow swing that decays, in a recording of 90 s."""
+    values = {"force": 350.0, "mean": -750.0, "frequency": 0.006, "phase": -1.4, "decay": 0.003}
+    values |= {"start": start, "duration": duration}
+    path = "effects.external_load."
+    machine = with_values(joint1(), {path + name: value for name, value in values.items()})
+    p = Plant(machine).record[0]
+    forces = [external_load.force(float(t), p) for t in np.arange(acts[0] + 0.005, acts[1], 0.01)]
+    found = mean_while_it_acts(machine.effects.external_load, 90.0)
+    assert found == pytest.approx(np.mean(forces), abs=1.0)
+    assert abs(found) > 100.0

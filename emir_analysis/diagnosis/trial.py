@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class Trial:
         """The effects' names."""
         return " + ".join(self.effects) or "parameters only"
 
-    @property
+    @cached_property
     def machine(self) -> Machine:
         """The machine with the fitted parameters."""
         return self.unknowns.at(self.x)

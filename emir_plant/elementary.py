@@ -22,7 +22,7 @@ LARGEST = 708.0  # of a number whose exponential and its inverse are of normal s
 
 @compiled
 def sine(angle: float) -> float:
-    """Return the sine of an angle, rad, within a million of which one is as exact as the angle."""
+    """Return the sine of an angle, rad; within 1e5 rad off by less than the angle is rounded."""
     return _sine(angle, 0.0)
 
 

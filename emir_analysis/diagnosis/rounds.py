@@ -74,11 +74,20 @@ class Rounds:
     def beside(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more.
 
+        Where all that the fits see is explained, what acts later is asked for first.
+        """
+        self._asked.add(frozenset(best.trial.effects))
+        if at_noise(best.trial, self._head):
+            return self._in_held_back(best) or self._one_more(best)
+        return self._one_more(best) or self._acting_late(best)
+
+    def _one_more(self, best: Tried) -> list[Tried]:
+        """Return what is better with one effect more on what the fits see.
+
         Where missing sensors leave balances out, what those would show is in the free run alone:
         that is asked too where the others do not explain it, and where they are quiet: what acts
         in a few windows only, or hardly more than their noise, does not tell there which it is.
         """
-        self._asked.add(frozenset(best.trial.effects))
         better = []
         if np.any(self._evidence.fitted):
             found = self._on_balances(best.trial).singles
@@ -86,11 +95,10 @@ class Rounds:
             near = any(self._excess(t.trial) < beyond(EXPLAINED) for t in better)
             told = near or self._evidence.complete
             if told and not self._quiet(best.trial):
-                return better or self._acting_late(best)
+                return better
         known = [t.trial.effects for t in better]
         others = [t for t in self._on_free_run(best) if t.trial.effects not in known]
-        better += self._better(others, best)
-        return better or self._acting_late(best)
+        return better + self._better(others, best)
 
     def exchanged(self, full: Trial) -> list[Tried]:
         """Return what is better on the whole with another effect in place of one of several.
@@ -224,7 +232,7 @@ class Rounds:
         Beside the best so far, or beside what explains with one effect more all that the fits see.
         """
         late = self._in_held_back(best)
-        if late or at_noise(best.trial, self._head):
+        if late:
             return late
         more = [t for t in self.tried if set(t.trial.effects) > set(best.trial.effects)]
         told = [t for t in more if t.free_run is not None and at_noise(t.trial, self._head)]

@@ -212,11 +212,16 @@ class Search:
         """Return the parameters alone as effects are looked for beside them.
 
         As the balances have them. Where sensors leave all of these out, as the longest beginning
-        has them that they explain: what acts later cannot have led them astray.
+        has them that they explain: what acts later cannot have led them astray. Likewise where the
+        balances are quiet and they explain all that the fits see.
         """
-        if np.any(self._evidence.fitted):
-            return fit_balances(self.balanced, self._head, self.floor)
-        return following(self.balanced, self._head)
+        if not np.any(self._evidence.fitted):
+            return following(self.balanced, self._head)
+        told = fit_balances(self.balanced, self._head, self.floor)
+        if not leaves_quiet(told, self._head):
+            return told
+        followed = following(told, self._head)
+        return followed if at_noise(followed, self._head) else told
 
     def _one_at_a_time(self, best: Tried, equal: list[Trial]) -> tuple[Tried, list[Trial], bool]:
         """Add effects to a trial, one a round, as long as that is better.

@@ -402,6 +402,21 @@ def test_what_acts_little_and_late_is_found() -> None:
     assert at_noise(found, evidence)
 
 
+def test_what_acts_late_is_asked_for_first_where_parameters_explain_all_before() -> None:
+    """The balances are quiet and tell parameters less well than a free run: 1.3 times the noise."""
+    lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
+    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 2)
+    slow = with_values(joint1(), {"effects.valve_gain_asymmetry.lowering": -0.05})
+    evidence = Evidence([operated(slow, np.concatenate([lifted, lowered]), angle=1.2)], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    seen = evidence.head(SEEN)
+    assert mean_square(searched.balanced, seen) > AT_NOISE**2 > mean_square(searched._plain(), seen)
+    (found,) = searched.run()
+    lowering = found.machine.effects.valve_gain_asymmetry.lowering
+    assert lowering == pytest.approx(-0.05, abs=0.002)
+    assert [tried.trial.effects for tried in searched.tried] == [(), ("valve_gain_asymmetry",)]
+
+
 @pytest.mark.parametrize(("force", "beside"), [(-100.0, {}), (-60.0, SHIFT)])
 def test_a_small_load_late_is_found(force: float, beside: dict[str, float]) -> None:
     """Of 10 kg, from 12 of 16 s on; the part that the fits see ends after 10.7 s."""

@@ -70,6 +70,7 @@ class Rounds:
         self.tried: list[Tried] = []
         self._asked: set[frozenset[str]] = set()  # effects beside which another was looked for
         self._beside_none: OnBalances | None = None
+        self._next: dict[frozenset[str], tuple[Tried, list[Trial]]] = {}  # left, by effects beside
 
     def beside(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more.
@@ -132,6 +133,19 @@ class Rounds:
         found = side_by_side(self._simulated, promising)
         self.tried += found + [t for t in begun if t not in promising]
         return found
+
+    def ask_further(self, best: Trial) -> None:
+        """Fit what was next to a series of a trial on the free run, as many as were fitted there.
+
+        A series has terms enough to stand for what comes close.
+        """
+        for effect in best.effects:
+            others = frozenset(best.effects) - {effect}
+            if REGISTRY[effect].is_series and others in self._next:
+                beside, begun = self._next.pop(others)
+                known = {frozenset(tried.trial.effects) for tried in self.tried}
+                new = [t for t in begun if frozenset(t.effects) not in known]
+                self.tried += side_by_side(self._simulated, self._all_led(new, beside))
 
     def beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.
@@ -293,7 +307,11 @@ class Rounds:
         """
         near = self._head.until(astray(best.trial, self._head) + SHORTEST)
         found = screen_free_run(best.trial, self._sheet, near)
-        begun = [s.trial for s in found[:MOST_SIMULATED]]
+        begun = [s.trial for s in found[: 2 * MOST_SIMULATED]]
+        self._next[frozenset(best.trial.effects)] = best, begun[MOST_SIMULATED:]
+        return self._all_led(begun[:MOST_SIMULATED], best)
+
+    def _all_led(self, begun: list[Trial], best: Tried) -> list[Tried]:
         return side_by_side(lambda each: self.scored(self._led(each, best)), begun)
 
     def _led(self, begun: Trial, best: Tried) -> Trial:

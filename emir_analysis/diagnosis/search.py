@@ -174,6 +174,7 @@ class Search:
         series = any(REGISTRY[effect].is_series for effect in best.effects)
         if left >= beyond(HOPELESS) or not (series or left > beyond(LEFT)):
             return equal
+        self._rounds.ask_further(best)
         asked = [t.trial for t in self.tried if t.free_run is not None]
         alike = [t for t in asked if len(t.effects) == len(best.effects) and not sticks(t)]
         others = [t for t in alike if set(t.effects) != set(best.effects)]

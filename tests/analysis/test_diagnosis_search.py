@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
 from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.run_errors import at_rest, mean_square
-from emir_analysis.diagnosis.screening import OnBalances
+from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -385,6 +386,25 @@ def test_an_effect_that_stood_for_another_is_exchanged() -> None:
     assert at_noise(found, evidence)
     for path, value in hidden.items():
         assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.02)
+
+
+def test_what_comes_next_is_asked_before_a_series_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without pressures an error of the linkage may be nearer to a soft hose than that itself."""
+
+    def hose_fourth(*known: Any) -> list[Screened]:
+        found = {each.trial.effects[0]: each for each in screen_free_run(*known)}
+        ahead = ("linkage_error", "valve_gain_asymmetry", "external_leakage", "vessel_compliance")
+        return [found[effect] for effect in ahead]
+
+    monkeypatch.setattr("emir_analysis.diagnosis.rounds.screen_free_run", hose_fourth)
+    soft = with_values(joint1(), {"effects.vessel_compliance.lowering": 6e-12})
+    evidence = Evidence([without(without_p_s(moved(soft)), "pressure_lifting")], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    asked = searched._rounds
+    linkage, *_ = asked._on_free_run(asked.scored(searched._plain()))
+    asked.tried = [asked._simulated(linkage)]
+    (found,) = searched.nearest_the_whole([asked.tried[0].trial])
+    assert found.effects == ("vessel_compliance",)
 
 
 def test_what_acts_little_and_late_is_found() -> None:

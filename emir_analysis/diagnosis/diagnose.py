@@ -252,13 +252,20 @@ def _drifts(named: Trial, search: Search) -> bool:
 def _measured(
     curves: Curves, closest: Trial, search: Search, evidence: Evidence, progress: Progress
 ) -> Trial | None:
-    """Return what no effect explains as a curve, beside the closest effects if need be."""
-    progress("measuring what has no name")
-    found = curves.measured()
-    if found is None and closest.effects:
-        progress(f"measuring what has no name beside: {closest.name}")
-        found = curves.measured(fit_balances(closest, evidence, search.floor))
-    return found
+    """Return what no effect explains as a curve, beside the closest effects if need be.
+
+    None after a search that was stopped where that takes long, too.
+    """
+
+    def measured() -> Trial | None:
+        progress("measuring what has no name")
+        found = curves.measured()
+        if found is None and closest.effects:
+            progress(f"measuring what has no name beside: {closest.name}")
+            found = curves.measured(fit_balances(closest, evidence, search.floor))
+        return found
+
+    return evidence.limit.afterwards(measured, lambda: progress("that takes too long: left out"))
 
 
 def _verdict(final: Trial, after: Array, evidence: Evidence, *, rivals: int) -> str:

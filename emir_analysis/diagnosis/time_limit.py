@@ -11,6 +11,8 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
+AFTERWARDS = 0.25  # of the time: what follows work that was ended may take so much more
+
 
 class OutOfTimeError(Exception):
     """The time is over. `TimeLimit.within` catches it."""
@@ -34,11 +36,25 @@ class TimeLimit:
         """Return what some work returns, or, where the time is over before, something else."""
         if self.is_over:
             return otherwise()
+        try:
+            return self._watched(work)
+        except OutOfTimeError:
+            self.is_over = True
+        return otherwise()
+
+    def afterwards(self, work: Callable[[], Result], otherwise: Callable[[], Result]) -> Result:
+        """Return the same of what follows; where the time was over, in a share of it of its own."""
+        if not self.is_over:
+            return work()
+        self._end = monotonic() + AFTERWARDS * self.seconds
+        try:
+            return self._watched(work)
+        except OutOfTimeError:
+            return otherwise()
+
+    def _watched(self, work: Callable[[], Result]) -> Result:
         self._is_watched = True
         try:
             return work()
-        except OutOfTimeError:
-            self.is_over = True
         finally:
             self._is_watched = False
-        return otherwise()

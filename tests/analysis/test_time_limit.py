@@ -78,3 +78,22 @@ def test_only_work_within_a_limit_ends_with_it(monkeypatch: pytest.MonkeyPatch) 
     assert limit.is_over
     assert work() == "work"
     assert limit.within(work, lambda: "otherwise") == "otherwise"
+
+
+def test_what_follows_a_search_that_was_stopped_has_a_share_of_its_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(time_limit, "monotonic", lambda: now[0])
+    limit = TimeLimit(1.0)
+
+    def takes(seconds: float) -> str:
+        now[0] += seconds
+        limit.check()
+        return "work"
+
+    assert limit.afterwards(lambda: takes(9.0), lambda: "left out") == "work"
+    assert limit.within(lambda: takes(9.0), lambda: "stopped") == "stopped"
+    assert limit.afterwards(lambda: takes(0.2), lambda: "left out") == "work"
+    assert limit.afterwards(lambda: takes(0.3), lambda: "left out") == "left out"
+    assert takes(9.0) == "work"

@@ -68,6 +68,7 @@ def test_activated_and_deactivated_by_its_services() -> None:
         assert state() == State.PRIMARY_STATE_ACTIVE
         assert change(Transition.TRANSITION_DEACTIVATE)
         until(lambda: valve[-1] == 0.0)
+        assert state() == State.PRIMARY_STATE_INACTIVE  # with what was still under way
         count = len(valve)
         assert state() == State.PRIMARY_STATE_INACTIVE
         assert len(valve) == count

@@ -127,8 +127,21 @@ def _begun(start: Trial, evidence: Evidence, floor: Array, rival: Sequence[float
     def end(law: Law) -> Law:
         return law._replace(fitted=led(law.start, evidence, law.fitted.x, time, DECIDED))
 
-    ends = side_by_side(end, _as_good(laws, evidence.until(time)))
+    ends = side_by_side(end, _both(laws, start, evidence.until(time)))
     return Begun(_as_good(ends, evidence.until(DECIDED))[0], left)
+
+
+def _both(laws: Sequence[Law], start: Trial, evidence: Evidence) -> list[Law]:
+    """Return the best laws as `_as_good`; one by tanh is begun from one that comes gradually, too.
+
+    Rounding may have lost it on the way.
+    """
+    best = _as_good(laws, evidence)
+    if is_gradual(start) or not is_gradual(best[0].start):
+        return best
+    blunter = with_sharper_friction(start.at(best[0].trial.x), 1.0 / SHARPER)
+    by_tanh = _refitted(Law(start, best[0].fitted), evidence, from_rest(blunter, evidence))
+    return _as_good([*best, by_tanh], evidence)
 
 
 def _as_good(laws: Sequence[Law], evidence: Evidence) -> list[Law]:

@@ -72,7 +72,7 @@ class BackwardElimination:
 
         def anew(fewer: Trial) -> Trial:
             self._progress(f"fitting anew: {fewer.name}")
-            begun = trial(self._sheet, fewer.effects, plain)
+            begun = trial(self._sheet, fewer.effects, plain).formed(fewer.form)
             if np.any(self._evidence.fitted):
                 begun = fit_balances(begun, self._evidence, self._floor)
             return refine_free_run(fit_free_run(begun, self._evidence), self._evidence, full)

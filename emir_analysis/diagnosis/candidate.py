@@ -109,13 +109,14 @@ class Left:
 class Candidate:
     """Effects more, begun at the best of their starts; the known parameters stay in `start`.
 
-    effect: the last of them. x: (k,) their fields, bounds: of x. at_best, slopes: what is left
-    there, (n,), and its slopes, (k, n). expected: cost, to first order, when they do their best.
+    effect: the last of them. form: of all. x: (k,) their fields, bounds: of x.
+    at_best, slopes: what is left there, (n,), and its slopes, (k, n).
+    expected: cost, to first order, when they do their best.
     """
 
     def __init__(self, start: Trial, known: int, starts: list[Array], left: Left) -> None:
         self._start, self._known, self._left = start, known, left
-        self.effect = start.effects[-1]
+        self.effect, self.form = start.effects[-1], start.form
         self._further = start.unknowns.members[known:]
         low, high = (bound[known:] for bound in start.unknowns.bounds)
         self.bounds = (low, high)

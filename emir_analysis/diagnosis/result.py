@@ -45,6 +45,7 @@ INTERVAL = 2.0  # standard deviations on either side of a parameter's low and hi
 FEWEST_DIGITS = 3
 OPEN = "not determined by the recording"
 SET = "not told here: taken so"
+OTHERS_WORSE = "the others explain it worse"
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 
 
@@ -295,7 +296,9 @@ def effect_results(
             elif parameter in usual or getattr(effect, parameter) != 0.0:
                 value = float(getattr(effect, parameter))
                 low, high, note = value, value, SET
-                if path in undecided:
+                if path in chosen.form:
+                    note = OTHERS_WORSE
+                elif path in undecided:
                     low, high, note = 0.0, 1.0, OPEN
                 elif is_share(path) and not sticks(chosen):  # whose other end is hard to fit
                     note = f"{1.0 - value:.0f} explains it worse"

@@ -322,7 +322,7 @@ class Rounds:
         """
         if not self._evidence.complete:
             return begun
-        start = trial(self._sheet, begun.effects, best.trial)
+        start = trial(self._sheet, begun.effects, best.trial).formed(begun.form)
         balanced = fit_balances(start, self._head, self._floor)
         return min(begun, balanced, key=lambda t: excess(t, self._head))
 

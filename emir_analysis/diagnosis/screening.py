@@ -4,9 +4,10 @@ Cheap enough for every effect of the registry, since only its own few fields are
 `candidate.py`).
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Hashable, Iterable
 from functools import cached_property
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 
@@ -36,6 +37,7 @@ MOST_FITTED = 8  # effects, or pairs of them, whose own fields are fitted
 MOST_AGAIN = 4  # of these, from other shares as well: as many as are then fitted to the balances
 NEAR_BEST = 2.0  # times the least cost: what leaves more does not come to it by other shares
 SILENT = 0.5  # cost of a residual, of which noise makes 0.35: nothing is left to be explained
+Found = TypeVar("Found")
 BEFORE = -1.0  # s: begin of a load that acts all the time, at rest too
 LOAD_STEP = 0.25  # s: between begins of a load; well below half a swing of the slow mode
 
@@ -57,7 +59,8 @@ class OnBalances:
 
         An effect that does not stay on is not in the list.
         """
-        promising = sorted(self._begun, key=lambda c: c.expected)[:MOST_FITTED]
+        begun = sorted(self._begun, key=lambda c: c.expected)
+        promising = _in_one_form(begun, lambda c: c.effect)[:MOST_FITTED]
         fits = zip(side_by_side(Candidate.fitted, promising), promising, strict=True)
         found = sorted(fits, key=lambda pair: pair[0].cost)
         least, silent = found[0][0].cost, SILENT * self._left.nothing.size
@@ -74,12 +77,13 @@ class OnBalances:
         other shares of them takes long, and fits to the free run do it.
         """
         known, left = self._known, self._left
-        pairs = sorted(
-            combinations(self._begun, 2), key=lambda pair: _expected(pair[0], pair[1], left.nothing)
-        )
+        pairs = [(a, b) for a, b in combinations(self._begun, 2) if a.effect != b.effect]
+        pairs.sort(key=lambda pair: _expected(pair[0], pair[1], left.nothing))
+        pairs = _in_one_form(pairs, lambda pair: (pair[0].effect, pair[1].effect))
         together = []
         for one, other in pairs[:MOST_FITTED]:
             start = trial(self._sheet, (*known.effects, one.effect, other.effect), known)
+            start = start.formed(one.form | other.form)
             together.append(Candidate(start, known.x.size, [np.append(one.x, other.x)], left))
         return sorted(side_by_side(Candidate.fitted, together), key=lambda s: s.cost)
 
@@ -95,8 +99,8 @@ def screen_free_run(known: Trial, sheet: Sheet, evidence: Evidence) -> list[Scre
     if not evidence.told[FORCE]:
         loads += _by_free_run(known, sheet, evidence, left)
     begun = _begun(known, sheet, loads, left, SMALL)
-    stepped = side_by_side(Candidate.stepped, begun)
-    return sorted(stepped, key=lambda s: s.cost)
+    stepped = sorted(side_by_side(Candidate.stepped, begun), key=lambda s: s.cost)
+    return _in_one_form(stepped, lambda s: s.trial.effects)
 
 
 def screen_faint_load(known: Trial, sheet: Sheet, evidence: Evidence) -> Screened:
@@ -146,15 +150,26 @@ def _begun(  # noqa: PLR0913, PLR0917 (what one effect is begun by)
     size: float = 1.0,
     names: Iterable[str] = REGISTRY,
 ) -> list[Candidate]:
-    """Begin each further effect of some; size: of its starts, in those on the balances."""
+    """Begin each further effect of some in each form.
 
-    def begin(name: str) -> Candidate:
-        start = trial(sheet, (*known.effects, name), known)
+    size: of its starts, in those on the balances.
+    """
+
+    def begin(start: Trial) -> Candidate:
         members = start.unknowns.members[known.x.size :]
-        starts = starting_fields(name, members, loads, size)
+        starts = starting_fields(start.effects[-1], members, loads, size)
         return Candidate(start, known.x.size, starts, left)
 
-    return side_by_side(begin, (name for name in names if name not in known.effects))
+    new = [trial(sheet, (*known.effects, n), known) for n in names if n not in known.effects]
+    return side_by_side(begin, [form for one in new for form in one.forms(one.effects[-1])])
+
+
+def _in_one_form(found: Iterable[Found], effects: Callable[[Found], Hashable]) -> list[Found]:
+    """Return what was found, the best first, but the same effects in other forms."""
+    best: dict[Hashable, Found] = {}
+    for one in found:
+        best.setdefault(effects(one), one)
+    return list(best.values())
 
 
 def _expected(one: Candidate, other: Candidate, nothing: Array) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from emir_analysis.diagnosis.fit import Solution
 from emir_analysis.diagnosis.unknowns import Unknown, Unknowns, unknowns
 from emir_analysis.signals import Array
-from emir_common.parameter_tree import with_values
+from emir_common.parameter_tree import declared, with_values
 from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
@@ -47,11 +48,32 @@ class Trial:
         """Return the trial with other parameters, (k,)."""
         return Trial(self.effects, self.unknowns, x, self.covariance)
 
+    @property
+    def form(self) -> dict[str, float]:
+        """The forms that its effects have, by dotted path."""
+        stated = declared(self.unknowns.machine)
+        return {path: stated[path][1] for name in self.effects for path in _forms(name)}
+
+    def forms(self, effect: str) -> "list[Trial]":
+        """Return the trial with each form of an effect, the usual one first."""
+        of_each = _forms(effect)
+        return [
+            self.formed(dict(zip(of_each, at, strict=True))) for at in product(*of_each.values())
+        ]
+
+    def formed(self, form: dict[str, float]) -> "Trial":
+        """Return the trial with effects of some forms, by dotted path."""
+        if not form:
+            return self
+        machine = with_values(self.unknowns.machine, form)
+        return replace(self, unknowns=replace(self.unknowns, machine=machine))
+
     def without(self, effect: str) -> "Trial":
         """Return the trial with one effect less."""
         others = tuple(name for name in self.effects if name != effect)
         gone = [u.path for u in self.unknowns.members if u.path.startswith(f"effects.{effect}.")]
-        return replace(self._less(gone), effects=others)
+        usual = {path: values[0] for path, values in _forms(effect).items()}
+        return replace(self._less(gone), effects=others).formed(usual)
 
     def cost_without(self, effect: str) -> float:
         """Return by how much leaving an effect out adds to the squared errors, to first order.
@@ -141,6 +163,11 @@ def trial(sheet: Sheet, effects: tuple[str, ...], known: Trial | None = None) ->
         members = Unknowns(known.unknowns.machine, (*known.unknowns.members, *new.members))
         x = np.append(known.x, new.start)
     return Trial(effects, members, x, np.full((x.size, x.size), np.nan))
+
+
+def _forms(effect: str) -> dict[str, tuple[float, ...]]:
+    """Return the values that give an effect other forms, by dotted path."""
+    return {f"effects.{effect}.{name}": at for name, at in REGISTRY[effect].forms.items()}
 
 
 def moved(x: Array, places: Sequence[int], values: Sequence[float]) -> Array:

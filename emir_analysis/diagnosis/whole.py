@@ -194,8 +194,8 @@ class Whole:
         """Return a trial with one size of an effect alone where that explains the whole as well.
 
         Or with Coulomb's friction in place of one whose break-away may be none, with a late command
-        in place of sensors that are all equally late, or with what is usual for a share. Two sizes
-        together may lead to where neither is right, such as a negative compliance.
+        in place of sensors that are all equally late, or with what is usual for a form or a share.
+        Two sizes together may lead to where neither is right, such as a negative compliance.
         """
         fitted = self._with_late_command(fitted)
         if not sticks(fitted):
@@ -205,8 +205,21 @@ class Whole:
             plain = without_breakaway(fitted, self._sheet)
             smooth = refine_free_run(plain, self._evidence, fitted)
             fitted = min(smooth, fitted, key=self.score)
-        fitted = self._with_usual_shares(fitted)
+        fitted = self._with_usual_shares(self._in_usual_form(fitted))
         self.keep(fitted)
+        return fitted
+
+    def _in_usual_form(self, fitted: Trial) -> Trial:
+        """Return a trial with its effects in their usual form, where that explains as well.
+
+        One edge of a valve that is off beside a null offset is both edges beside another offset.
+        """
+        for effect in fitted.effects:
+            begun = fitted.forms(effect)[0]
+            if begun.form != fitted.form:
+                usual = refine_free_run(begun, self._evidence, fitted)
+                if self.score(usual) < self.score(fitted) + STRONG:
+                    fitted = usual
         return fitted
 
     def _with_usual_shares(self, fitted: Trial) -> Trial:

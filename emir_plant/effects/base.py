@@ -22,6 +22,7 @@ class Effect:
     none_or_above: values of fields below which they count as none.
     other_law: fields that give the effect another law where they are not 0; a search begins at 0.
     given: fields that say what the others mean, and are not searched.
+    forms: values of given fields that make another effect of it; a search tries one by one.
     is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """
 
@@ -32,6 +33,7 @@ class Effect:
     stepwise: ClassVar[tuple[str, ...]] = ()
     none_or_above: ClassVar[dict[str, float]] = {}
     given: ClassVar[tuple[str, ...]] = ()
+    forms: ClassVar[dict[str, tuple[float, ...]]] = {}
     is_series: ClassVar[bool] = False
     other_law: ClassVar[tuple[str, ...]] = ()
 

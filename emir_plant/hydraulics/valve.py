@@ -17,8 +17,9 @@ def spool_acceleration(command: float, spool: float, spool_rate: float, p: Any) 
 def opening(spool: float, p: Any) -> float:
     """Return the signed opening o of the metering edges; 0 inside the dead zone, 1 fully open."""
     edges = valve_null_offset.shifted(spool, p)
-    beyond = abs(edges) - valve_dead_zone_error.dead_zone(p)
+    dead_zone = valve_dead_zone_error.dead_zone(edges, p)
+    beyond = abs(edges) - dead_zone
     if beyond <= 0.0:
         return 0.0
-    share = beyond / valve_dead_zone_error.travel(p)
+    share = beyond / valve_dead_zone_error.travel(dead_zone, p)
     return share if edges > 0.0 else -share

@@ -201,6 +201,24 @@ def test_an_effect_is_not_promised_parameters_beyond_their_tolerances() -> None:
     assert set(first.effects) == {"entrained_air", "vessel_compliance"}
 
 
+@pytest.mark.parametrize("edge", [0.0, 1.0, -1.0])
+def test_it_is_told_which_edge_of_the_valve_is_off(edge: float) -> None:
+    """Alone, and beside air in the oil."""
+    stated = joint1()
+    off = {"effects.valve_dead_zone_error.error": 0.03, "effects.valve_dead_zone_error.edge": edge}
+    air = {"effects.entrained_air.share": 0.013}
+    for hidden in (off, off | air):
+        evidence = Evidence([moved(with_values(stated, hidden))], stated)
+        floor = evidence.floor(stated)
+        sheet = Sheet(stated, {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}, {}, ())
+        plain = fit_balances(trial(sheet, ()), evidence, floor)
+        begun = OnBalances(plain, sheet, evidence, floor)
+        first = (begun.pairs if hidden.keys() > off.keys() else begun.singles)[0].trial
+        assert set(first.effects) == {path.split(".")[1] for path in hidden}
+        found = first.machine.effects.valve_dead_zone_error
+        assert (found.edge, found.error) == (edge, pytest.approx(0.03, abs=0.003))
+
+
 def test_what_the_residuals_do_not_depend_on_stays_unknown() -> None:
     def model(points: Array) -> Array:
         return np.array([x[0] * TIME - 2.0 * TIME for x in points])

@@ -310,6 +310,55 @@ class SameSlope(Hidden):
         return super().opening(edges, time, stroke) * steeper
 
 
+class OneEdge(Hidden):
+    """One metering edge ground elsewhere, the other as stated; full stroke opens fully."""
+
+    name = "valve_dead_zone_error~one edge"
+    grows = ("ground",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "ground": either_sign(random, 0.02, 0.06),
+            "lifts": float(random.choice([-1.0, 1.0])),
+        }
+
+    def opening(self, edges: float, time: float, stroke: float) -> float:
+        if edges * self.sizes["lifts"] <= 0.0:
+            return super().opening(edges, time, stroke)
+        begins = self.n.dead_zone + self.sizes["ground"]
+        opens = max((abs(edges) - begins) / (1.0 - begins), 0.0)
+        # where a full opening of what is stated is one, whatever else is hidden scales it
+        stated = self.n.dead_zone + opens * (1.0 - self.n.dead_zone)
+        return super().opening(math.copysign(stated, edges), time, stroke)
+
+
+class SquareDroop(Hidden):
+    """A filter behind the pump: pressure falls with the square of the flow."""
+
+    name = "supply_pressure_droop~square"
+    grows = ("at_full_flow",)
+
+    def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
+        super().__init__(numbers, sizes)
+        self._missing = self.slot()
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"at_full_flow": between(random, 2e6, 8e6)}
+
+    def supply(self, time: float, x: list[float]) -> float:
+        return super().supply(time, x) - 1e5 * x[self._missing]
+
+    def remembered_rates(self, time: float, x: list[float], now: dict[str, float]) -> list[float]:
+        others = super().remembered_rates(time, x, now)
+        wanted = 1e-5 * self.sizes["at_full_flow"] * (now["pumped"] / self.n.flow_nominal) ** 2
+        return [*others, (wanted - x[self._missing]) / 0.02]
+
+    def start_memory(self, angle: float, x: list[float]) -> list[float]:
+        return [*super().start_memory(angle, x), 0.0]
+
+
 class PlayOfMagnet(Hidden):
     """Play between command and spool."""
 
@@ -459,6 +508,8 @@ FOREIGN: tuple[type[Hidden], ...] = (
     SwingAboutMean,
     OtherOil,
     SameSlope,
+    OneEdge,
+    SquareDroop,
     PlayOfMagnet,
     LaggingCommand,
     StribeckOnBristles,

@@ -52,32 +52,6 @@ class SmoothHysteresis(Hidden):
         return [*super().start_memory(angle, x), 0.0]
 
 
-class SquareDroop(Hidden):
-    """A pump line: pressure falls with the square of the flow."""
-
-    name = "supply_pressure_droop~square"
-    grows = ("at_full_flow",)
-
-    def __init__(self, numbers: Numbers, sizes: Sizes | None = None) -> None:
-        super().__init__(numbers, sizes)
-        self._missing = self.slot()
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"at_full_flow": between(random, 2e6, 8e6)}
-
-    def supply(self, time: float, x: list[float]) -> float:
-        return super().supply(time, x) - 1e5 * x[self._missing]
-
-    def remembered_rates(self, time: float, x: list[float], now: dict[str, float]) -> list[float]:
-        others = super().remembered_rates(time, x, now)
-        wanted = 1e-5 * self.sizes["at_full_flow"] * (now["pumped"] / self.n.flow_nominal) ** 2
-        return [*others, (wanted - x[self._missing]) / 0.02]
-
-    def start_memory(self, angle: float, x: list[float]) -> list[float]:
-        return [*super().start_memory(angle, x), 0.0]
-
-
 class UnevenFriction(Hidden):
     """A seal that rubs less on the way down."""
 
@@ -257,7 +231,6 @@ class StraightFriction(Hidden):
 
 FOREIGN: tuple[type[Hidden], ...] = (
     SmoothHysteresis,
-    SquareDroop,
     UnevenFriction,
     AirInOneChamber,
     StiffeningHose,

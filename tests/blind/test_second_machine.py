@@ -229,6 +229,18 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"lowering": -0.3 * STATED.volume_lowering_0 / STATED.beta, "wall_share": 1.0},
     ),
     _OTHER["valve_dead_zone_error~same slope"]: ({"moved": 0.03}, {"error": 0.03, "rescaled": 0.0}),
+    _OTHER["valve_dead_zone_error~one edge"]: (
+        {"ground": 0.04, "lifts": -1.0},
+        {"error": 0.04, "edge": -1.0},
+    ),
+    _OTHER["supply_pressure_droop~square"]: (
+        {"at_full_flow": 8e6},
+        {
+            "resistance": 8e6 / STATED.flow_nominal,
+            "time_constant": 0.02,
+            "turbulent_share": 1.0,
+        },
+    ),
     _OTHER["valve_hysteresis~on the command"]: (
         {"magnet": 0.04},
         {"width": 0.04, "command_share": 1.0},

@@ -25,6 +25,7 @@ from emir_plant.effects import (
     linkage_error,
     logic_block_fault,
     sensor_delay,
+    supply_pressure_droop,
     terms,
     valve_hysteresis,
     vessel_compliance,
@@ -555,6 +556,18 @@ def test_supply_droops_by_r_q_once_the_lag_is_over() -> None:
     assert PLAIN.step(PLAIN.initial(FORTY_FIVE), 0.55, 1.0)[0][core.DROOP] == 0.0
 
 
+def test_a_turbulent_droop_goes_with_the_square_of_the_flow() -> None:
+    """As much as a laminar one at the valve's own flow, a quarter of that at half of it."""
+    droop = {"resistance": 1e9, "time_constant": 1.0, "turbulent_share": 1.0}
+    p = _with(supply_pressure_droop=droop).record[0]
+    laminar = _with(supply_pressure_droop=droop | {"turbulent_share": 0.0}).record[0]
+    full = p["flow_nominal"]
+    at_full = supply_pressure_droop.rate(0.0, full, laminar)
+    for share in (0.5, 1.0):
+        assert supply_pressure_droop.rate(0.0, share * full, p) == pytest.approx(share**2 * at_full)
+    assert supply_pressure_droop.rate(1e5, 0.0, p) == pytest.approx(-1e5)
+
+
 def test_a_drooping_supply_is_felt_only_where_pressure_is_short() -> None:
     def speed(plant: Plant) -> float:
         run = plant.simulate(plant.initial(math.radians(20.0), 20e5), np.full(3000, 0.9), 1e-3, 10)
@@ -584,6 +597,23 @@ def test_null_offset_and_dead_zone_move_where_the_valve_opens() -> None:
     assert grown == pytest.approx(0.2 / 0.9)  # as stated
     none = _with(valve_dead_zone_error={"error": -0.5}).record[0]
     assert valve.opening(0.01, none) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("edge", [1.0, -1.0])
+def test_one_edge_of_the_valve_may_be_off_alone(edge: float) -> None:
+    """Where both open elsewhere by as much is a dead zone and a null offset of half of it."""
+    alone = _with(valve_dead_zone_error={"error": 0.05, "edge": edge}).record[0]
+    both = _with(valve_dead_zone_error={"error": 0.05}).record[0]
+    shifted = _with(
+        valve_dead_zone_error={"error": 0.025, "rescaled": 0.0},
+        valve_null_offset={"offset": -edge * 0.025},
+    ).record[0]
+    begins = _with(valve_dead_zone_error={"error": 0.05, "edge": edge, "rescaled": 0.0}).record[0]
+    for spool in (0.11, 0.14, 0.16, 0.5, 1.0):
+        assert valve.opening(edge * spool, alone) == valve.opening(edge * spool, both)
+        assert valve.opening(-edge * spool, alone) == valve.opening(-edge * spool, PLAIN.record[0])
+        for side in (spool, -spool):
+            assert valve.opening(side, begins) == pytest.approx(valve.opening(side, shifted))
 
 
 def test_gain_asymmetry_scales_the_flow_of_one_direction() -> None:

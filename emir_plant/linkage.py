@@ -67,15 +67,16 @@ def lever_arms(angles: Array, p: Any) -> Array:
     return found
 
 
+@compiled
 def reach(p: Any) -> tuple[float, float]:
     """Return the lowest and highest boom angle, rad.
 
     Between the triangle's dead points, where foot, joint and rod eye are in line and the piston
     moves nothing, and as far as both chambers hold oil.
     """
-    low, high = -p["triangle_gamma0"], math.pi - p["triangle_gamma0"]
-    retracted = -p["volume_lifting_0"] / p["area_lifting"]
-    extended = p["volume_lowering_0"] / p["area_lowering"]
+    low, high = -p.triangle_gamma0, math.pi - p.triangle_gamma0
+    retracted = -p.volume_lifting_0 / p.area_lifting
+    extended = p.volume_lowering_0 / p.area_lowering
     if stroke(low, p) < retracted:
         low = angle(retracted, p)
     if stroke(high, p) > extended:

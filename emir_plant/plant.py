@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from emir_plant import core, integration, linkage
+from emir_plant import core, integration, rest
 from emir_plant.core import Array, Truth
-from emir_plant.effects import backlash, command_delay, external_load, linkage_error
-from emir_plant.hydraulics import logic_block
+from emir_plant.effects import command_delay
 from emir_plant.parameters import Machine
 from emir_plant.record import record
-from emir_plant.unnamed import force as unnamed_force
 
 REST_PRESSURE = 2e6  # Pa, p_S of the boom at rest where nothing else is asked for
 
@@ -53,14 +51,14 @@ class Plant:
         hold the boom.
         """
         p = self.record[0]
-        lowest, highest = linkage.reach(p)
-        if not lowest < angle < highest:
+        acting = rest.acting(angle, self.record)
+        if not acting.lowest < angle < acting.highest:
             raise SimulationError(
                 f"boom angle {math.degrees(angle):.1f} deg: outside the linkage's reach,"
-                f" {math.degrees(lowest):.1f} ... {math.degrees(highest):.1f} deg"
+                f" {math.degrees(acting.lowest):.1f} ... {math.degrees(acting.highest):.1f} deg"
             )
         low = float(p["pT"]) if pressure_lowering is None else pressure_lowering
-        position, force = self._resting(angle)
+        position, force = self._resting(angle, acting)
         high = (force + low * p["area_lowering"]) / p["area_lifting"]
         if not 0.0 <= high <= p["p0"]:
             raise SimulationError(
@@ -69,26 +67,20 @@ class Plant:
             )
         x = np.zeros(core.MODES + 2 * position.size)
         x[core.P_H], x[core.P_S] = high, low
-        pilot = logic_block.pilot_pressure(high, low, p)
-        x[core.LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
-        x[core.OFFSET] = backlash.flank(force, p)
+        x[core.LOGIC], x[core.OFFSET] = rest.seated(high, low, force, self.record)
         x[core.DELAY_LINE : core.MODES] = command_delay.empty_line()
         x[core.MODES : core.MODES + position.size] = position
         x[core.LATE_ANGLE], x[core.LATE_P_H], x[core.LATE_P_S] = angle, high, low
-        x[core.LATE_STROKE] = linkage_error.stroke(angle, p) + x[core.OFFSET]
+        x[core.LATE_STROKE] = acting.stroke + x[core.OFFSET]
         x[core.LATE_DEFLECTION] = p["mode_tip_angle"] @ position - angle
         return x
 
-    def _resting(self, angle: float) -> tuple[Array, float]:
+    def _resting(self, angle: float, acting: rest.Acting) -> tuple[Array, float]:
         """Return the modal coordinates at rest at a boom angle, rad, and the oil's force, N."""
         p = self.record[0]
-        outside = external_load.force(0.0, p)
-        load = p["mode_weight"] * math.cos(angle)
-        load -= p["mode_tip"] * external_load.at_tip(outside, angle, p)
+        load = p["mode_weight"] * math.cos(angle) - p["mode_tip"] * acting.at_tip
         torque = load[0] / p["mode_joint"][0]
-        needed = torque - external_load.about_joint(outside, p)
-        force = needed / linkage_error.lever_arm(angle, p) - external_load.on_piston(outside, p)
-        force -= unnamed_force.along(0.0, linkage_error.stroke(angle, p), p)
+        force = (torque - acting.about_joint) / acting.lever_arm - acting.on_piston - acting.unnamed
         bent = p["mode_joint"] * torque - load
         position = np.zeros_like(load)
         position[1:] = bent[1:] / p["mode_stiffness"][1:]

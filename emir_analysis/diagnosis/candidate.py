@@ -161,7 +161,12 @@ class Candidate:
         return self._screened([self.x, *self._ends([begin])])
 
     def fitted_again(self, found: Screened) -> Screened:
-        """Fit them from none and from all of each share as well; fits may stop in between."""
+        """Fit them from none and from all of each share as well; fits may stop in between.
+
+        Not of what acts only beyond some value: there a share stands for a size that is off.
+        """
+        if REGISTRY[self.effect].stepwise:
+            return found
         own = found.trial.x[self._known :]
         shares = [(k, u) for k, u in enumerate(self._further) if u.is_share]
         ends = [(k, end) for k, share in shares for end in (share.low, share.high)]
@@ -248,10 +253,13 @@ def starting_fields(
     """Return vectors, (k,), of the effect's fields from which a fit may start.
 
     Of several sizes all together, and each alone: together one may hide what another explains.
-    One that acts only beyond some value in steps of its trial size.
+    One that acts only beyond some value in steps of its trial size, with what is usual for shares:
+    by another law such a step is another one.
     loads: at the TCP, that explain much. size: of the effect, in trial sizes.
     """
     x = np.array([unknown.start for unknown in members])
+    if REGISTRY[effect].stepwise:
+        x = np.array([u.at(_usual(u)) if u.is_share else u.start for u in members])
     if effect == LOAD:
         return [
             x,
@@ -266,6 +274,12 @@ def starting_fields(
         on = np.array([u.path.endswith(f".{stepwise}") for u in members])
         starts += [np.where(sizes, s * x * on, x) for s in STEPS]
     return starts
+
+
+def _usual(unknown: Unknown) -> float:
+    """Return what an effect's parameter is where nobody says otherwise."""
+    _, effect, name = unknown.path.split(".")
+    return float(getattr(REGISTRY[effect](), name))
 
 
 def load_fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Array:

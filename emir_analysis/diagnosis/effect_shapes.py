@@ -7,11 +7,13 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import mean_squares
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import coarse_errors
 from emir_analysis.diagnosis.trial import Trial, moved
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 
+SAME = 0.05  # of a share, within which it was led to an end
 MOST_SHAPING = 3  # fields of an effect, beside its sizes, that are tried in all combinations
 SHAPE_STEP = math.log(4.0)  # between those that are tried of a field that is fitted as its log
 
@@ -28,6 +30,20 @@ def shapes(start: Trial, effect: str, evidence: Evidence) -> list[Trial]:
     points = _shapes(start, effect)
     errors = coarse_errors([start.unknowns.at(x) for x in points], evidence)
     return [start.at(points[k]) for k in np.argsort(mean_squares(errors))]
+
+
+def at_other_ends(known: Trial, told: Trial) -> list[Trial]:
+    """Return a trial with each share set to none and to all, but to where it was led already.
+
+    A load's shares are told by where it is begun. told: the trial fitted further.
+    """
+    return [
+        known.fixed(unknown.path, end)
+        for unknown, x in zip(known.unknowns.members, told.x, strict=True)
+        if unknown.is_share and not unknown.path.startswith(f"effects.{LOAD}.")
+        for end in (0.0, 1.0)
+        if abs(x - unknown.at(end)) > SAME * abs(unknown.at(1.0))
+    ]
 
 
 def _shapes(start: Trial, effect: str) -> Array:

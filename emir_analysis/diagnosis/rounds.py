@@ -7,6 +7,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.balances import FORCE, level
 from emir_analysis.diagnosis.candidate import Screened
+from emir_analysis.diagnosis.effect_shapes import at_other_ends
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, with_fewer_terms
@@ -405,7 +406,7 @@ class Rounds:
         all told. Nor do fewer terms of a series lead anywhere then.
         """
         self._progress(f"free run: {tried.trial.name}")
-        full = fit_free_run(tried.trial, self._head)
+        full = self._with_shares_told(tried.trial, fit_free_run(tried.trial, self._head))
         hopeless = excess(full, self._head) > beyond(HOPELESS)
         if self._evidence.complete and hopeless:
             return replace(tried, free_run=free_run_score(full, self._evidence))
@@ -420,6 +421,23 @@ class Rounds:
         scores = [free_run_score(way, self._evidence) for way in ways]
         best_way = int(np.argmin(scores))
         return Tried(ways[best_way], tried.balances, scores[best_way])
+
+    def _with_shares_told(self, balanced: Trial, full: Trial) -> Trial:
+        """Return a trial fitted to the free run, or the same with a share at an end, if better.
+
+        balanced: the same fitted to the balances. Where those are quiet and the free run is not
+        explained, a share that they do not tell may have led it astray.
+        """
+        told = excess(full, self._head) <= beyond(EXPLAINED)
+        if told or sticks(full) or not self._quiet(balanced):
+            return full
+        ends = side_by_side(self._fitted_twice, at_other_ends(balanced, full))
+        return min([full, *ends], key=lambda one: excess(one, self._head))
+
+    def _fitted_twice(self, begun: Trial) -> Trial:
+        """Return a trial fitted to the balances and, where they are quiet, to the free run."""
+        told = fit_balances(begun, self._head, self._floor)
+        return fit_free_run(told, self._head) if self._quiet(told) else told
 
     def _suffices(self, tried: Trial, best: Trial) -> bool:
         """Tell whether the whole recordings need no more than a trial, and that far more than best.

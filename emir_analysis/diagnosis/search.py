@@ -212,9 +212,9 @@ class Search:
     def _plain(self) -> Trial:
         """Return the parameters alone as effects are looked for beside them.
 
-        As the balances have them. Where sensors leave all of these out, as the longest beginning
-        has them that they explain: what acts later cannot have led them astray. Likewise where the
-        balances are quiet and they explain all that the fits see.
+        As the balances have them. Where sensors leave all of these out, or some and the others are
+        quiet, as the longest beginning has them that they explain: what acts later cannot have led
+        them astray. Likewise where all are quiet and they explain all that the fits see.
         """
         if not np.any(self._evidence.fitted):
             return following(self.balanced, self._head)
@@ -222,7 +222,8 @@ class Search:
         if not leaves_quiet(told, self._head):
             return told
         followed = following(told, self._head)
-        return followed if at_noise(followed, self._head) else told
+        trusted = not self._evidence.complete or at_noise(followed, self._head)
+        return followed if trusted else told
 
     def _one_at_a_time(self, best: Tried, equal: list[Trial]) -> tuple[Tried, list[Trial], bool]:
         """Add effects to a trial, one a round, as long as that is better.
@@ -328,7 +329,7 @@ class Search:
         """
         best = equal[0]
         for other in (t.trial for t in better):
-            fewer = other.x.size < best.x.size and not sticks(other)
+            fewer = other.numbers < best.numbers and not sticks(other)
             explain = fewer and at_noise(best, self._head) and at_noise(other, self._head)
             if explain and self._on_the_whole(other) < self._on_the_whole(best) + STRONG:
                 best, equal = other, [other]
@@ -395,9 +396,11 @@ def _as_good(better: list[Tried]) -> list[Trial]:
     """Return the best trial and those that are as good.
 
     Of two of which one is the other without a break-away the one with fewer parameters: it would
-    be as good whatever the recordings are.
+    be as good whatever the recordings are. An effect in an unusual form is named where nothing else
+    is as good: under one command one edge of a valve opens later as a gain is less.
     """
     equal = rivals([t.trial for t in better], [free(t) for t in better])
+    equal = [t for t in equal if not t.unusual] or equal
     best = next((less for less in equal[1:] if nested(equal[0], less)), equal[0])
-    others = [t for t in equal[1:] if t is not best and t.x.size <= best.x.size]
+    others = [t for t in equal[1:] if t is not best and t.numbers <= best.numbers]
     return [best, *others]

@@ -46,7 +46,7 @@ def balance_score(trial: Trial, evidence: Evidence, floor: Array) -> float:
     independent = covered / CORRELATION_TIME
     # as the fit counts them: far above the noise by their size, so that no window decides alone
     misfit = independent * float(np.sum(np.mean(2.0 * (np.sqrt(1.0 + missing**2) - 1.0), axis=0)))
-    return misfit + trial.x.size * float(np.log(independent * missing.shape[1]))
+    return misfit + trial.numbers * float(np.log(independent * missing.shape[1]))
 
 
 def free_run_score(trial: Trial, evidence: Evidence, seen: float = SEEN) -> float:
@@ -60,7 +60,7 @@ def free_run_score(trial: Trial, evidence: Evidence, seen: float = SEEN) -> floa
     if not np.all(np.isfinite(unseen)):
         return float("inf")
     channels = np.maximum(np.mean(unseen**2, axis=0), 1.0)
-    return score(channels, evidence.duration(1.0 - seen) / CORRELATION_TIME, trial.x.size)
+    return score(channels, evidence.duration(1.0 - seen) / CORRELATION_TIME, trial.numbers)
 
 
 def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
@@ -69,11 +69,11 @@ def rivals(trials: list[Trial], scores: list[float]) -> list[Trial]:
     One that needs more parameters for no less error is no rival.
     """
     best = int(np.argmin(scores))
-    size = trials[best].x.size
+    size = trials[best].numbers
     close = [
         other
         for other, value in zip(trials, scores, strict=True)
-        if other is not trials[best] and value < scores[best] + STRONG and other.x.size <= size
+        if other is not trials[best] and value < scores[best] + STRONG and other.numbers <= size
     ]
     return [trials[best], *close]
 

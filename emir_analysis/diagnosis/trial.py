@@ -49,10 +49,22 @@ class Trial:
         return Trial(self.effects, self.unknowns, x, self.covariance)
 
     @property
+    def numbers(self) -> int:
+        """How many numbers say what it is: those fitted, and each form that is not the usual."""
+        return self.x.size + self.unusual
+
+    @property
+    def unusual(self) -> int:
+        """How many of its effects' forms are not the usual ones."""
+        usual = {path: at[0] for name in self.effects for path, at in _forms(name).items()}
+        return sum(usual[path] != at for path, at in self.form.items())
+
+    @property
     def form(self) -> dict[str, float]:
         """The forms that its effects have, by dotted path."""
-        stated = declared(self.unknowns.machine)
-        return {path: stated[path][1] for name in self.effects for path in _forms(name)}
+        of_each = [path for name in self.effects for path in _forms(name)]
+        stated = declared(self.unknowns.machine) if of_each else {}
+        return {path: stated[path][1] for path in of_each}
 
     def forms(self, effect: str) -> "list[Trial]":
         """Return the trial with each form of an effect, the usual one first."""

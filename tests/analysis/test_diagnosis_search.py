@@ -42,6 +42,7 @@ from emir_analysis.diagnosis.select import (
 from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.statement import closest, statement, verdict
 from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.trial import moved as changed
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms
@@ -425,7 +426,7 @@ def test_what_acts_little_and_late_is_found() -> None:
 def test_what_acts_late_is_asked_for_first_where_parameters_explain_all_before() -> None:
     """The balances are quiet and tell parameters less well than a free run: 1.3 times the noise."""
     lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])
-    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 2)
+    lowered = np.array([-0.45] * 40 + [0.0] * 50 + [-0.25] * 40 + [0.0] * 50)
     slow = with_values(joint1(), {"effects.valve_gain_asymmetry.lowering": -0.05})
     evidence = Evidence([operated(slow, np.concatenate([lifted, lowered]), angle=1.2)], joint1())
     searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
@@ -435,6 +436,46 @@ def test_what_acts_late_is_asked_for_first_where_parameters_explain_all_before()
     lowering = found.machine.effects.valve_gain_asymmetry.lowering
     assert lowering == pytest.approx(-0.05, abs=0.002)
     assert [tried.trial.effects for tried in searched.tried] == [(), ("valve_gain_asymmetry",)]
+
+
+def test_without_a_gauge_parameters_are_as_a_beginning_has_them() -> None:
+    """Lifting only: as the one balance has them they leave far more there than the fault later."""
+    lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 3])
+    lowered = np.array(([-0.45] * 40 + [0.0] * 50) * 3)
+    fault = with_values(joint1(), {"effects.logic_block_fault.threshold": 30e5})
+    run = operated(fault, np.concatenate([lifted, lowered]), angle=1.2)
+    evidence = Evidence([without(run, "pressure_lifting")], joint1())
+    unknown = (
+        "cylinder.volume_lifting_0",
+        "cylinder.volume_lowering_0",
+        "resistances.k_block_in",
+        "resistances.k_pump_line",
+        "valve.natural_frequency",
+    )
+    sheet = Sheet(joint1(), TOLERANCES | dict.fromkeys(unknown, 0.1), {}, ())
+    searched = Search(evidence, sheet, lambda _: None)
+    lifts = evidence.until(9.0)
+    assert mean_square(searched.balanced, lifts) > EXPLAINED**2
+    assert mean_square(searched._plain(), lifts) < AT_NOISE**2
+
+
+def test_a_share_that_no_balance_tells_is_told_by_the_free_run() -> None:
+    """Play ahead of a slow spool; a fit has taken it for play behind it."""
+    slow = with_values(joint1(), {"valve.natural_frequency": 40.0, "valve.damping": 0.5})
+    share = "effects.valve_hysteresis.command_share"
+    hidden = {"effects.payload.mass": 60.0, "effects.valve_hysteresis.width": 0.03, share: 1.0}
+    evidence = Evidence([moved(with_values(slow, hidden), duration=24.0)], slow)
+    sheet = Sheet(slow, TOLERANCES, {}, ())
+    rounds, head = Search(evidence, sheet, lambda _: None)._rounds, evidence.head(SEEN)
+    start = trial(sheet, ("payload", "valve_hysteresis"))
+    balanced = fit_balances(start, head, evidence.floor(slow))
+    k = [unknown.path for unknown in balanced.unknowns.members].index(share)
+    astray = balanced.at(changed(balanced.x, [k], [0.0]))
+    assert mean_square(astray, head) > EXPLAINED**2
+    told = rounds._with_shares_told(balanced, astray)
+    assert mean_square(told, head) < AT_NOISE**2
+    found = told.machine.effects.valve_hysteresis
+    assert (found.width, found.command_share) == (pytest.approx(0.03, rel=0.01), 1.0)
 
 
 @pytest.mark.parametrize(("force", "beside"), [(-100.0, {}), (-60.0, SHIFT)])

@@ -8,6 +8,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cache, update_wrapper
 from importlib import import_module
 from pathlib import Path
@@ -68,10 +69,26 @@ def _numba() -> Any:
     return numba
 
 
+def _if_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
+    """Return what saves compiled code where the disk takes it: on a full one it runs all the same.
+
+    numba lets the failure through, and whoever calls the function first would get it.
+    """
+
+    def save_or_not(*what: Any) -> None:
+        with suppress(OSError):
+            save(*what)
+
+    return save_or_not
+
+
 def _compiled(function: Function, **options: bool) -> Function:
     def make() -> Any:
         decorate = _numba().njit(cache=True, error_model="numpy", forceinline=True, **options)
-        return decorate(function)
+        made = decorate(function)
+        cache = made._cache  # noqa: SLF001 (numba has no option for it)
+        cache.save_overload = _if_there_is_room(cache.save_overload)
+        return made
 
     return cast("Function", update_wrapper(OnFirstUse(make), function))
 

@@ -259,7 +259,7 @@ def starting_fields(
     """
     x = np.array([unknown.start for unknown in members])
     if REGISTRY[effect].stepwise:
-        x = np.array([u.at(_usual(u)) if u.is_share else u.start for u in members])
+        x = np.array([u.at(u.usual) if u.is_share else u.start for u in members])
     if effect == LOAD:
         return [
             x,
@@ -274,12 +274,6 @@ def starting_fields(
         on = np.array([u.path.endswith(f".{stepwise}") for u in members])
         starts += [np.where(sizes, s * x * on, x) for s in STEPS]
     return starts
-
-
-def _usual(unknown: Unknown) -> float:
-    """Return what an effect's parameter is where nobody says otherwise."""
-    _, effect, name = unknown.path.split(".")
-    return float(getattr(REGISTRY[effect](), name))
 
 
 def load_fields(members: tuple[Unknown, ...], load: Load, piston_share: float) -> Array:

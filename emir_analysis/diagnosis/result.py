@@ -45,7 +45,7 @@ INTERVAL = 2.0  # standard deviations on either side of a parameter's low and hi
 FEWEST_DIGITS = 3
 OPEN = "not determined by the recording"
 SET = "not told here: taken so"
-OTHERS_WORSE = "the others explain it worse"
+NONE_BETTER = "none of the others explains it better"
 CONFOUNDED = 0.9  # correlation of two fitted parameters from which on the data hardly part them
 
 
@@ -297,7 +297,7 @@ def effect_results(
                 value = float(getattr(effect, parameter))
                 low, high, note = value, value, SET
                 if path in chosen.form:
-                    note = OTHERS_WORSE
+                    note = NONE_BETTER
                 elif path in undecided:
                     low, high, note = 0.0, 1.0, OPEN
                 elif is_share(path) and not sticks(chosen):  # whose other end is hard to fit

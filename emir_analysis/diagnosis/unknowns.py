@@ -61,6 +61,14 @@ class Unknown:
         return is_share(self.path)
 
     @property
+    def usual(self) -> float:
+        """What a parameter of an effect is where nobody says otherwise, SI unit; NaN: of none."""
+        if self._field is None:
+            return math.nan
+        kind, name = self._field
+        return float(getattr(kind(), name))
+
+    @property
     def _field(self) -> tuple[type[Effect], str] | None:
         return _effect_field(self.path)
 

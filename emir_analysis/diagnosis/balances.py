@@ -28,8 +28,8 @@ from emir_analysis.diagnosis.experiment import (
     SUBSTEP,
     Experiment,
 )
-from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, free_runs, stable_step
-from emir_analysis.diagnosis.measured_state import Modelled, follow
+from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, free_runs
+from emir_analysis.diagnosis.measured_state import Modelled, follow, longest_step
 from emir_analysis.diagnosis.noise_colour import coloured, colours
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
@@ -151,7 +151,7 @@ class Balances:
         """Return what is missing in each balance, (m, w, 5), SI units.
 
         NaN for a machine that cannot rest at the recording's start. longest: step of integration,
-        s; shorter where a machine is stable in shorter ones only.
+        s; shorter where a machine asks for shorter ones.
         """
         plants = [Plant(machine) for machine in machines]
         true = np.array([self._undistorted(plant.machine) for plant in plants])
@@ -226,13 +226,14 @@ class Balances:
         if not starts:
             return []
         able = list(starts)
-        commands, step = experiment.mean_commands(min(longest, stable_step(plants)))
+        records = _by_velocity([plants[k].record for k in able])
+        commands, step = experiment.mean_commands(min(longest, longest_step(records)))
         followed = follow(
             np.array(list(starts.values())),
             commands,
             step,
             np.ascontiguousarray(true[able][:, :, [1, 2, SMOOTHED, 5, angle]]),
-            _by_velocity([plants[k].record for k in able]),
+            records,
         )
         return [(k, Modelled(*columns)) for k, columns in zip(able, followed, strict=True)]
 

@@ -4,6 +4,7 @@ The machine's right-hand side is integrated by scipy with a tight tolerance, eff
 here a second time, the sensors too, and `rosbags` writes the files.
 """
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,8 +14,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.integrate import solve_ivp
 
-from emir_plant import core, linkage
-from emir_plant.parameters import Machine
+from emir_plant import core
+from emir_plant.parameters import Geometry, Machine
 from emir_plant.plant import Plant
 
 Array = NDArray[np.float64]
@@ -91,6 +92,15 @@ def moves(duration: float, seed: int) -> Array:
     return command
 
 
+def cylinder(angle: float, geometry: Geometry) -> tuple[float, float]:
+    """Return the piston's stroke and its lever arm, m, at a boom angle, rad."""
+    a, b, at_zero = geometry.triangle_a, geometry.triangle_b, geometry.triangle_gamma0
+    enclosed = angle + at_zero
+    length = math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(enclosed))
+    stretched = math.sqrt(a * a + b * b - 2.0 * a * b * math.cos(at_zero))
+    return length - stretched, a * b * math.sin(enclosed) / length
+
+
 def simulate(
     machine: Machine,
     commands: Array,
@@ -102,18 +112,16 @@ def simulate(
     friction is added to the machine's own right-hand side.
     """
     plant = Plant(machine)
-    p = plant.record[0]
-    modes = p["mode_joint"].size
+    joint, tip = plant.record[0]["mode_joint"], plant.record[0]["mode_tip_angle"]
+    modes = joint.size
     position = slice(core.MODES, core.MODES + modes)
     rate = slice(core.MODES + modes, core.MODES + 2 * modes)
 
     def slope(_: float, x: Array, command: float) -> Array:
         dx = plant.derivative(x, command)
         if friction is not None:
-            angle = float(p["mode_joint"] @ x[position])
-            arm = linkage.lever_arm(angle, p)
-            velocity = arm * float(p["mode_joint"] @ x[rate])
-            dx[rate] -= p["mode_joint"] * arm * friction(linkage.stroke(angle, p), velocity)
+            stroke, arm = cylinder(float(joint @ x[position]), machine.geometry)
+            dx[rate] -= joint * arm * friction(stroke, arm * float(joint @ x[rate]))
         return dx
 
     x = plant.initial(np.pi / 4.0, 25e5)
@@ -126,6 +134,7 @@ def simulate(
             slope,
             (begin, end),
             x,
+            method="DOP853",
             args=(command,),
             t_eval=np.append(np.maximum(inside, begin), end),
             rtol=1e-7,
@@ -134,7 +143,7 @@ def simulate(
         shown.append(run.y[:, :-1])
         x = run.y[:, -1]
     states = np.concatenate(shown, axis=1)
-    angles = [weights @ states[position] for weights in (p["mode_joint"], p["mode_tip_angle"])]
+    angles = [weights @ states[position] for weights in (joint, tip)]
     return np.column_stack([states[core.P_H], states[core.P_S], *angles])
 
 
@@ -148,10 +157,10 @@ def measured(
     noise = np.random.default_rng(seed).standard_normal((len(truth), 3))
     time = np.arange(len(truth)) * period
     angle = np.round(truth[:, 2] / STEP) * STEP
-    p = Plant(machine).record[0]
+    strokes = np.array([cylinder(a, machine.geometry)[0] for a in angle])
     return {
         "joint_states": (time, angle),
-        "cylinder": (time, np.array([linkage.stroke(a, p) for a in angle])),
+        "cylinder": (time, strokes),
         "pressure_lifting": (time, truth[:, 0] + 0.2e5 * noise[:, 0]),
         "pressure_lowering": (time, truth[:, 1] + 0.2e5 * noise[:, 1]),
         "boom_deflection": (time, truth[:, 3] - truth[:, 2] + 2e-5 * noise[:, 2]),

@@ -13,6 +13,8 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import joint1, load_sheet
 
 FRICTION = 12e3  # N
+DROOP = "effects.supply_pressure_droop"
+SPRING = 1.839e8  # N m/rad, of the data sheet
 
 
 @pytest.fixture(scope="module")
@@ -97,11 +99,13 @@ def rms(missing: recorded.Array) -> dict[str, float]:
     return dict(zip(BALANCES, np.sqrt(np.mean(missing**2, axis=0)), strict=True))
 
 
-def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
-    _, missing = residuals(machine, None)
+def assert_nothing_is_missing(machine: Machine, missing: recorded.Array) -> None:
+    """Demand that no balance keeps more than the sensors leave in it.
+
+    From the resolver alone: a parabola through 100 angles of 1 s, a line through 50 of 0.5 s, each
+    angle off by a step's uniform error; 2 for the pressures' noise and the smoothing.
+    """
     found = rms(missing)
-    # From the resolver alone: a parabola through 100 angles of 1 s, a line through 50 of 0.5 s,
-    # each angle off by a step's uniform error; 2 for the pressures' noise and the smoothing.
     step = recorded.STEP / np.sqrt(12.0)
     arm, inertia = 0.64, 5000.0 * 22.5**2 / 3.0
     assert found["force"] < 2.0 * np.sqrt(4.0 * 180.0 / 100.0) * step * inertia / arm
@@ -112,12 +116,40 @@ def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
     assert found["bending"] < machine.sensors.deflection_noise
 
 
+def test_the_right_machine_lacks_nothing(machine: Machine) -> None:
+    assert_nothing_is_missing(machine, residuals(machine, None)[1])
+
+
 def test_long_steps_of_integration_leave_the_balances_as_they_are(machine: Machine) -> None:
     """Commands change inside a step of 5 ms, which takes the mean of them."""
     balances, found = residuals(machine, None)
     exact = balances.residuals([machine], longest=1e-3)[0]
     for name in ("force", "lifting_chamber", "lowering_chamber", "bending"):
         assert 0.0 < rms(found - exact)[name] < 0.05 * rms(exact)[name], name
+
+
+@pytest.mark.parametrize(
+    "quick",
+    [
+        {"geometry.section_spring": 16.0 * SPRING},  # its modes turn by up to 8 rad in 5 ms
+        {"logic_block.time_constant_opening": 1e-3, "logic_block.threshold": 90e5},
+        {"valve.natural_frequency": 2000.0},
+        {f"{DROOP}.resistance": 1e9, f"{DROOP}.time_constant": 1e-3},
+        {f"{DROOP}.resistance": 1e10, f"{DROOP}.time_constant": 0.1},
+        {"effects.backlash.gap": 1e-3, "effects.backlash.crossing_time": 2e-3},
+    ],
+)
+def test_what_is_quick_is_followed(machine: Machine, quick: dict[str, float]) -> None:
+    """At the minima of p_H the block shuts at its threshold and opens at once."""
+    other = with_values(machine, quick)
+    commands = np.round(5.0 * recorded.moves(12.0, seed=5)) / 5.0
+    balances = balances_of(other, commands, recorded.simulate(other, commands))
+    found = balances.residuals([other])[0]
+    if not other.effects.backlash.is_on:  # which moves the stroke
+        assert_nothing_is_missing(other, found)
+    exact = balances.residuals([other], longest=2e-4)[0]
+    for name in ("force", "lifting_chamber", "lowering_chamber", "bending"):
+        assert rms(found - exact)[name] < 0.05 * rms(exact)[name], name
 
 
 def test_the_mean_command_of_a_step_keeps_what_the_command_adds_up_to(machine: Machine) -> None:

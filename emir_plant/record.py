@@ -2,7 +2,8 @@
 
 import dataclasses
 from functools import cache
-from typing import Any
+from operator import attrgetter
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from emir_plant.boom import BoomModes, boom_modes
 from emir_plant.curve import POINTS
 from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
-from emir_plant.parameters import Geometry, Machine, groups
+from emir_plant.parameters import Geometry, Machine
 from emir_plant.unnamed import UNNAMED
 
 _UNNAMED = {f"{g}_{n}": q for g, kind in UNNAMED.items() for n, q in quantities(kind).items()}
@@ -27,6 +28,21 @@ EFFECT_SIZES = (
 )
 
 
+def _paths() -> dict[str, str]:
+    """Return the dotted path of each parameter in a machine by its field in the record."""
+    found: dict[str, str] = {}
+    for group, kind in get_type_hints(Machine).items():
+        prefix = f"{group}_" if group in UNNAMED else ""
+        found |= {prefix + name: f"{group}.{name}" for name in quantities(kind)}
+    for effect, kind in REGISTRY.items():
+        found |= {f"{effect}_{name}": f"effects.{effect}.{name}" for name in quantities(kind)}
+    return found
+
+
+_PATHS = _paths()
+_read = attrgetter(*_PATHS.values())
+
+
 def record(machine: Machine) -> NDArray[Any]:
     """Return a structured array of one element with every parameter as a field.
 
@@ -37,7 +53,7 @@ def record(machine: Machine) -> NDArray[Any]:
     geometry = _with_effects(machine)
     # the modes do not know of this factor: machines that differ in it share them
     modes = boom_modes(dataclasses.replace(geometry, modal_frequency=1.0))
-    values = _parameters(machine) | _modes(modes, geometry)
+    values = dict(zip(_PATHS, _read(machine), strict=True)) | _modes(modes, geometry)
     values["length_stretched"] = third_side(
         geometry.triangle_a, geometry.triangle_b, geometry.triangle_gamma0
     )
@@ -56,15 +72,6 @@ def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
 def _with_effects(machine: Machine) -> Geometry:
     """Return the geometry with those effects in it that change a parameter of the boom."""
     return dataclasses.replace(machine.geometry, payload=machine.payload)
-
-
-def _parameters(machine: Machine) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for path, group in groups(machine).items():
-        name = path.removeprefix("effects.")
-        prefix = f"{name}_" if name != path or name in UNNAMED else ""
-        values |= {prefix + name: getattr(group, name) for name in quantities(group)}
-    return values
 
 
 def _modes(modes: BoomModes, geometry: Geometry) -> dict[str, Any]:

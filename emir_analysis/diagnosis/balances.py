@@ -29,12 +29,13 @@ from emir_analysis.diagnosis.experiment import (
     Experiment,
 )
 from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, free_runs
-from emir_analysis.diagnosis.measured_state import Modelled, follow, longest_step
+from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.diagnosis.noise_colour import coloured, colours
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
 from emir_plant.effects import Effects, terms
+from emir_plant.measured_step import longest_step
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.sensors import resolver

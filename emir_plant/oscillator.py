@@ -2,8 +2,12 @@
 
 import math
 
-from emir_analysis.signals import Array
+import numpy as np
+from numpy.typing import NDArray
+
 from emir_plant.jit import compiled_in_place
+
+Array = NDArray[np.float64]
 
 SAME = 1e-6  # rad or time constants, by which its two rates are the same
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from emir_analysis.diagnosis.oscillator import swung, write_swing
+from emir_plant.oscillator import swung, write_swing
 
 
 @pytest.mark.parametrize("damping", [0.0, 8.0, 399.99999, 400.0, 400.00001, 3000.0])

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 RESOLVED = 1.25  # rad, of the spool's swing in a step: its edges open and shut in between
 SETTLED = 2.0  # time constants in a step; Kutta's rule is stable up to 2.5
-QUICKEST = 5e-4  # s: what settles quicker has long settled, whatever comes out for it
+QUICKEST = 5e-4  # s: a shorter one, which a fit may try, is not followed: it would take forever
 HALF, WHOLE = 0, -1  # of a step: where the spool's swings stand among all
 START, MIDDLE, END, AHEAD = 0, 1, 2, 3  # of a step: rates at three instants, and a state ahead
 
@@ -38,7 +38,11 @@ def longest_step(parameters: NDArray[Any]) -> float:
 
 @compiled_in_place
 def _droop_settling(p: Any) -> float:
-    """Return the time constant, s, of a droop that throttles the flow which makes it."""
+    """Return the time constant, s, of a droop that throttles the flow which makes it.
+
+    Where the pump's pressure is short the pressure balance is open, and flow gives way over about
+    the drop that it holds.
+    """
     droop = p.supply_pressure_droop_resistance * p.flow_nominal
     if droop == 0.0:
         return math.inf
@@ -152,8 +156,8 @@ def _bend(  # noqa: PLR0913, PLR0917 (as advance)
 ) -> None:
     """Advance the bending modes of x by dt, s, under a force that grows evenly.
 
-    start, end: rates there, both with the modes as they are at the start; at the end they are put
-    right.
+    start, end: rates there, both with the modes as they are at the start; the accelerations at the
+    end are put right.
     """
     n = p.mode_joint.size
     for i in range(1, n):
@@ -165,7 +169,7 @@ def _bend(  # noqa: PLR0913, PLR0917 (as advance)
         middle = (first - c * drift) / k
         off, rate = swung(x[place] - middle, x[speed] - drift, swings[i])
         x[place], x[speed] = middle + drift * dt + off, drift + rate
-        end[place], end[speed] = x[speed], last - k * x[place] - c * x[speed]
+        end[speed] = last - k * x[place] - c * x[speed]
 
 
 @compiled_in_place

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from emir_analysis.diagnosis.balances import level
+from emir_analysis.diagnosis.candidates import CandidateResult
 from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.drift import Drift
@@ -226,18 +227,26 @@ def _curve(curve: Curve) -> list[Block]:
 
 
 def _candidates(result: Diagnosis) -> list[Block]:
+    def where_fitted(figure: float | None) -> str:
+        return "not simulated" if figure is None else f"{figure:.3g}"
+
+    def sizes(candidate: CandidateResult) -> str:
+        told = (f"{n.partition('.')[2]} {s.value:.3g} {s.unit}" for n, s in candidate.sizes.items())
+        return ", ".join(each.removesuffix(" 1") for each in told)
+
     rows = [
-        (c.name, c.score, "not simulated" if c.free_run is None else f"{c.free_run:.3g}")
+        (c.name, c.score, where_fitted(c.free_run), where_fitted(c.left), sizes(c))
         for c in result.candidates
     ]
     return [
         Heading("What was tried"),
         Table(
-            ("effects", "balances", "free run"),
+            ("effects", "balances", "free run", "left", "sizes"),
             rows,
-            "How much better than parameters only, in the free run on the last third of the "
-            "recording, which the fit had not seen: difference of the Bayesian information "
-            "criterion, above 10 strong.",
+            "balances, free run: how much better than parameters only, in the free run on the last "
+            "third of the recording, which the fit had not seen: difference of the Bayesian "
+            "information criterion, above 10 strong. left: RMS error of the free run of the whole "
+            "recording, times the noise; 1 is all that can be explained. sizes: as fitted so far.",
         ),
     ]
 

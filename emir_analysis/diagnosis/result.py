@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from emir_analysis.diagnosis.balances import BALANCES, level
+from emir_analysis.diagnosis.candidates import CandidateResult, candidates
 from emir_analysis.diagnosis.control import ControlResult
 from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.diagnose import Findings
@@ -106,19 +107,6 @@ class MisstatedResult:
 
 
 @dataclass(frozen=True)
-class CandidateResult:
-    """What was tried.
-
-    score: how much better than parameters only on the balances, free_run: the same of the unseen
-    part's free run where it was fitted; above 10 is strong evidence.
-    """
-
-    name: str
-    score: float
-    free_run: float | None
-
-
-@dataclass(frozen=True)
 class BalanceResult:
     """RMS over the quieter 95 % of the windows; noise: the part that the sensors alone make."""
 
@@ -147,13 +135,13 @@ class Diagnosis:
 
     verdict: nothing_missing, found, ambiguous, unexplained; statement: the same in words. Where
     nothing is missing in the recordings but something in the judge, it is unexplained, unless
-    other parameters inside the tolerances explain both. rivals: what would do as well where
-    ambiguous. tell_apart: a movement that would tell them apart.
-    signals: over the whole judge recordings; block_medians: medians over 15 s blocks; one_step:
-    one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of what
-    stays unexplained, swing: how that swings with time, where: most of it lies. at_end: parameters
-    that were led to the end of what data sheet and registry allow. curve: what has no name and
-    `with_effect` then has. untold: what missing sensors leave open, by balance. control: a
+    other parameters inside the tolerances explain both. candidates: what was tried, the nearest
+    first. rivals: what would do as well where ambiguous. tell_apart: a movement that would tell
+    them apart. signals: over the whole judge recordings; block_medians: medians over 15 s blocks;
+    one_step: one sample ahead. parameters: the re-fitted tolerances of the final machine. shape: of
+    what stays unexplained, swing: how that swings with time, where: most of it lies. at_end:
+    parameters that were led to the end of what data sheet and registry allow. curve: what has no
+    name and `with_effect` then has. untold: what missing sensors leave open, by balance. control: a
     controller designed before and after, on the machine as found, where that was asked for.
     """
 
@@ -196,7 +184,7 @@ def diagnosis(
         effects=effect_results(findings.chosen, fitted, findings.undecided),
         rivals=tuple(rival.name for rival in findings.rivals if findings.verdict == "ambiguous"),
         tell_apart=tell_apart(findings),
-        candidates=_candidates(findings),
+        candidates=candidates(findings),
         balances=_balances(findings),
         signals=_signals(findings, {s: column_rms(np.concatenate(e)) for s, e in errors.items()}),
         block_medians=_signals(findings, {s: block_medians(e, periods) for s, e in errors.items()}),
@@ -307,20 +295,6 @@ def effect_results(
                 )
         found.append(EffectResult(name, kind.balance, parameters))
     return tuple(found)
-
-
-def _candidates(findings: Findings) -> tuple[CandidateResult, ...]:
-    plain = findings.tried[0]
-    return tuple(
-        CandidateResult(
-            tried.trial.name,
-            float(plain.balances - tried.balances),
-            None
-            if tried.free_run is None or plain.free_run is None
-            else float(plain.free_run - tried.free_run),
-        )
-        for tried in findings.tried[1:]
-    )
 
 
 def _balances(findings: Findings) -> dict[str, BalanceResult]:

@@ -153,6 +153,13 @@ def test_friction_is_named_and_written_down(folder: Path, built: Machine, tmp_pa
     page = (tmp_path / "a.html").read_text()
     assert page.count("<img") == 3
     assert "emir design --from designs for it" in page
+    nearest, *others = written["candidates"]
+    assert nearest["name"] == "coulomb_friction"
+    assert nearest["left"] < AT_NOISE
+    assert nearest["sizes"]["coulomb_friction.force"]["value"] == pytest.approx(15e3, rel=0.02)
+    assert all(other["left"] is None or other["left"] > nearest["left"] for other in others)
+    assert len({other["name"] for other in others}) == len(others)
+    assert f"force {effect.parameters['force'].value:.3g} N" in page
     assert "Nothing was added" not in page + summary(result)
 
 

@@ -1,0 +1,69 @@
+"""What was tried: each set of effects once, the nearest first."""
+
+import math
+from dataclasses import dataclass
+
+from emir_analysis.diagnosis.diagnose import Findings
+from emir_analysis.diagnosis.run_errors import mean_square
+from emir_analysis.diagnosis.trial import Trial
+from emir_common.parameter_tree import declared
+from emir_plant.effects import REGISTRY
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large an effect is; unit: SI."""
+
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class CandidateResult:
+    """A set of effects that was tried.
+
+    score: how much better than parameters only on the balances, free_run: the same of the unseen
+    part's free run where it was fitted; above 10 is strong evidence. left: RMS error of the free
+    run of the whole recordings, times the noise, where it was fitted. sizes: of the effects, by
+    effect and parameter, those that are not 0.
+    """
+
+    name: str
+    score: float
+    free_run: float | None
+    left: float | None
+    sizes: dict[str, Size]
+
+
+def candidates(findings: Findings) -> tuple[CandidateResult, ...]:
+    """Return the sets of effects, each as it came nearest.
+
+    What was fitted to the whole in the end counts as that.
+    """
+    plain, *others = findings.tried
+    ended = {t.effects: t for t in (findings.chosen, findings.rejected) if t is not None}
+    nearest: dict[frozenset[str], CandidateResult] = {}
+    for tried in others:
+        fitted, free_run, left = tried.trial, None, None
+        if tried.free_run is not None:
+            fitted = ended.get(fitted.effects, fitted)
+            left = math.sqrt(mean_square(fitted, findings.evidence))
+            free_run = None if plain.free_run is None else float(plain.free_run - tried.free_run)
+        score = float(plain.balances - tried.balances)
+        candidate = CandidateResult(fitted.name, score, free_run, left, _sizes(fitted))
+        effects = frozenset(fitted.effects)
+        nearest[effects] = min(candidate, nearest.get(effects, candidate), key=_distance)
+    return tuple(sorted(nearest.values(), key=_distance))
+
+
+def _sizes(fitted: Trial) -> dict[str, Size]:
+    values = declared(fitted.machine)
+    names = [f"{effect}.{size}" for effect in fitted.effects for size in REGISTRY[effect].sizes]
+    told = {name: values[f"effects.{name}"] for name in names}
+    return {name: Size(value, about.unit) for name, (about, value) in told.items() if value}
+
+
+def _distance(candidate: CandidateResult) -> tuple[float, float]:
+    """Return by what candidates are sorted: what the free run leaves, else the balances."""
+    left = candidate.left
+    return math.inf if left is None or math.isnan(left) else left, -candidate.score

@@ -525,6 +525,26 @@ def test_two_effects_for_which_a_third_stands_are_asked_about_first() -> None:
     assert rounds == ["all effects beside: parameters only"]
 
 
+def test_a_leak_that_the_balances_hardly_know_of_is_found_beside_soft_oil() -> None:
+    """The leak drives the free run away, in which play comes nearer than softer oil alone."""
+    hidden = {
+        "effects.vessel_compliance.lifting": 6e-12,
+        "effects.external_leakage.lifting": 3e-13,
+    }
+    searched, sheet, evidence = search(hidden)
+    rounds = searched._rounds
+    rounds.tried = [rounds.scored(searched.refitted, free_run_score(searched.refitted, evidence))]
+    for effect in ("backlash", "vessel_compliance"):
+        balanced = fit_balances(trial(sheet, (effect,)), evidence, searched.floor)
+        single = fit_free_run(balanced, evidence.head(SEEN))
+        rounds.tried.append(rounds.scored(single, free_run_score(single, evidence)))
+    plain, play, soft = rounds.tried
+    assert play.balances > soft.balances
+    found = searched.whole.fitted(searched._two_at_once(plain, play)[0])
+    assert set(found.effects) == {"vessel_compliance", "external_leakage"}
+    assert at_noise(found, evidence)
+
+
 def test_a_third_effect_is_looked_for_where_no_two_bring_the_free_run_nearer() -> None:
     """Beside the pair that says most to the balances, if that says more than one effect."""
     hidden = {"effects.payload.mass": 200.0, "effects.internal_leakage.coefficient": 3e-12}

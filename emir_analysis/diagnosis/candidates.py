@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.run_errors import mean_square
+from emir_analysis.diagnosis.select import free_run_score
 from emir_analysis.diagnosis.trial import Trial
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
@@ -38,22 +39,29 @@ class CandidateResult:
 def candidates(findings: Findings) -> tuple[CandidateResult, ...]:
     """Return the sets of effects, each as it came nearest.
 
-    What was fitted to the whole in the end counts as that.
+    What was fitted to the whole in the end counts as that. Nearest is what explains the free run of
+    the whole best by its criterion, behind all that were simulated what explains the balances best.
     """
     plain, *others = findings.tried
     ended = {t.effects: t for t in (findings.chosen, findings.rejected) if t is not None}
-    nearest: dict[frozenset[str], CandidateResult] = {}
+    nearest: dict[frozenset[str], tuple[float, CandidateResult]] = {}
     for tried in others:
-        fitted, free_run, left = tried.trial, None, None
+        fitted, free_run, left, distance = tried.trial, None, None, math.inf
         if tried.free_run is not None:
             fitted = ended.get(fitted.effects, fitted)
             left = math.sqrt(mean_square(fitted, findings.evidence))
+            distance = free_run_score(fitted, findings.evidence, seen=0.0)
             free_run = None if plain.free_run is None else float(plain.free_run - tried.free_run)
         score = float(plain.balances - tried.balances)
         candidate = CandidateResult(fitted.name, score, free_run, left, _sizes(fitted))
-        effects = frozenset(fitted.effects)
-        nearest[effects] = min(candidate, nearest.get(effects, candidate), key=_distance)
-    return tuple(sorted(nearest.values(), key=_distance))
+        effects, found = frozenset(fitted.effects), (distance, candidate)
+        nearest[effects] = min(found, nearest.get(effects, found), key=_rank)
+    return tuple(candidate for _, candidate in sorted(nearest.values(), key=_rank))
+
+
+def _rank(found: tuple[float, CandidateResult]) -> tuple[float, float]:
+    distance, candidate = found
+    return distance, -candidate.score
 
 
 def _sizes(fitted: Trial) -> dict[str, Size]:
@@ -61,9 +69,3 @@ def _sizes(fitted: Trial) -> dict[str, Size]:
     names = [f"{effect}.{size}" for effect in fitted.effects for size in REGISTRY[effect].sizes]
     told = {name: values[f"effects.{name}"] for name in names}
     return {name: Size(value, about.unit) for name, (about, value) in told.items() if value}
-
-
-def _distance(candidate: CandidateResult) -> tuple[float, float]:
-    """Return by what candidates are sorted: what the free run leaves, else the balances."""
-    left = candidate.left
-    return math.inf if left is None or math.isnan(left) else left, -candidate.score

@@ -307,10 +307,20 @@ class Rounds:
         Where it has long gone astray no first-order step says anything.
         """
         near = self._head.until(astray(best.trial, self._head) + SHORTEST)
-        found = screen_free_run(best.trial, self._sheet, near)
+        found = screen_free_run(self._nearer(best.trial, near), self._sheet, near)
         begun = [s.trial for s in found[: 2 * MOST_SIMULATED]]
         self._next[frozenset(best.trial.effects)] = best, begun[MOST_SIMULATED:]
         return self._all_led(begun[:MOST_SIMULATED], best)
+
+    def _nearer(self, known: Trial, near: Evidence) -> Trial:
+        """Return a trial with its parameters as a beginning has them.
+
+        Where sensors are missing, the balances leave them open, and what an effect would add to
+        first order far from the machine says nothing. What sticks would take long.
+        """
+        if self._evidence.complete or sticks(known):
+            return known
+        return fit_free_run(known, near)
 
     def _all_led(self, begun: list[Trial], best: Tried) -> list[Tried]:
         return side_by_side(lambda each: self.scored(self._led(each, best)), begun)

@@ -46,7 +46,7 @@ from emir_analysis.diagnosis.trial import moved as changed
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms
-from emir_common.parameter_tree import with_values
+from emir_common.parameter_tree import declared, with_values
 from emir_control.cascade import Cascade, CascadeParameters
 from emir_control.trajectory import TrajectoryParameters, named
 from emir_plant.effects import external_load, vessel_compliance
@@ -457,6 +457,35 @@ def test_without_a_gauge_parameters_are_as_a_beginning_has_them() -> None:
     lifts = evidence.until(9.0)
     assert mean_square(searched.balanced, lifts) > EXPLAINED**2
     assert mean_square(searched._plain(), lifts) < AT_NOISE**2
+
+
+def test_without_gauges_an_effect_is_begun_from_parameters_as_a_beginning_has_them() -> None:
+    """From far off, where the one balance that is told leaves them, a payload promises nothing."""
+    stated, random = joint1(), np.random.default_rng(2)
+    tolerances = {
+        "cylinder.volume_lifting_0": 0.1,
+        "cylinder.volume_lowering_0": 0.1,
+        "cylinder.beta": 0.15,
+        "valve.flow_nominal": 0.03,
+        "resistances.k_pump_line": 0.1,
+        "resistances.k_block_in": 0.1,
+        "resistances.k_return_line": 0.1,
+        "resistances.k_block_out": 0.1,
+        "resistances.k_meter_out_lowering": 0.1,
+    }
+    values = {path: value for path, (_, value) in declared(stated).items()}
+    built = {
+        path: values[path] * (1.0 + tolerance * random.uniform(-0.9, 0.9))
+        for path, tolerance in tolerances.items()
+    }
+    loaded = moved(with_values(stated, built | {"effects.payload.mass": 60.0}))
+    for missing in ("pressure_lifting", "tip_deflection_angle"):
+        loaded = without(loaded, missing)
+    evidence = Evidence([loaded], stated)
+    searched = Search(evidence, Sheet(stated, tolerances, {}, ()), lambda _: None)
+    rounds = searched._rounds
+    begun = rounds._on_free_run(rounds.scored(searched._plain()))
+    assert "payload" in {each.trial.effects[0] for each in begun}
 
 
 def test_a_share_that_no_balance_tells_is_told_by_the_free_run() -> None:

@@ -258,7 +258,7 @@ class Search:
         self._progress(f"all effects beside: {best.trial.name}")
         if enough:
             return self._rounds.beside_enough(best)
-        better = self._rounds.beside(best)
+        better = self._beside_quiet(best) or self._rounds.beside(best)
         if best.trial.effects or not better:
             return better
         pairs = self._quiet_pairs(best, min(better, key=free))
@@ -266,6 +266,27 @@ class Search:
             singles = _as_good(better)
             self._equal[singles[0].effects] = singles
         return pairs or better
+
+    def _beside_quiet(self, best: Tried) -> list[Tried]:
+        """Return what suffices beside another single effect, one that the balances clearly prefer.
+
+        Where all are told, and quiet with it as they have it: what they hardly know of, such as a
+        small leak, leads its free run astray. What sticks is told by a beginning.
+        """
+        if len(best.trial.effects) != 1 or not self._evidence.complete:
+            return []
+        singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
+        first = min(singles, key=lambda t: t.balances, default=best)
+        if first.balances > best.balances - STRONG or sticks(first.trial):
+            return []
+        told = fit_balances(first.trial, self._head, self.floor)
+        if not leaves_quiet(told, self._evidence):
+            return []
+        self._progress(f"all effects beside what the balances prefer: {told.name}")
+        other = self._rounds.scored(told, free_run_score(told, self._evidence))
+        better = self._rounds.beside(other)
+        suffices = better and self._rounds.enough(self.whole.fitted(_as_good(better)[0]))
+        return better if suffices else []
 
     def _quiet_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
         """Return the pairs of effects that are better than a single one that leaves much.
@@ -284,7 +305,7 @@ class Search:
         Beside a pair that does not suffice a third effect is looked for.
         plain: parameters alone. best: so far, which does not suffice.
         """
-        others = self._beside_others(best)
+        others = [] if self._evidence.complete else self._beside_others(best)
         if others or not np.any(self._evidence.fitted):
             return others
         self._progress("pairs of effects")
@@ -301,38 +322,25 @@ class Search:
         return equal
 
     def _beside_others(self, best: Tried) -> list[Trial]:
-        """Return the best trials beside another effect than the best one, if they suffice."""
-        for other in self._other_firsts(best):
+        """Return the best trials beside another effect than the best one, if they suffice.
+
+        Where sensors are missing, the balances do not tell which of two the first to look beside
+        is, and the part held back knows little of it. That which says most to the balances comes
+        first, then those that are ahead in the free run.
+        """
+        singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
+        singles = sorted(singles, key=lambda t: t.balances)[:1] + sorted(singles, key=free)
+        others: dict[tuple[str, ...], Tried] = {}
+        for single in singles:
+            if single.trial.effects != best.trial.effects[:1]:
+                others.setdefault(single.trial.effects, single)
+        for other in list(others.values())[:MOST_OTHERS]:
             self._progress(f"all effects beside: {other.trial.name}")
             better = self._rounds.beside(other)
             found = _as_good(better) if better else []
             if found and self._rounds.enough(self.whole.fitted(found[0])):
                 return found
         return []
-
-    def _other_firsts(self, best: Tried) -> list[Tried]:
-        """Return the effects that the best one may stand for.
-
-        Where sensors are missing, the balances do not tell which of two the first to look beside
-        is, and the part held back knows little of it. That which says most to the balances comes
-        first, then those that are ahead in the free run. Where none is missing, it is that which
-        leaves the balances quiet, as those have it: what they hardly know of, as a small leak,
-        leads its free run astray.
-        """
-        singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
-        singles = [t for t in singles if t.trial.effects != best.trial.effects[:1]]
-        by_balances = sorted(singles, key=lambda t: t.balances)
-        if self._evidence.complete:
-            told = [self._as_balances_have_it(t.trial) for t in by_balances[:1]]
-            return [t for t in told if leaves_quiet(t.trial, self._evidence)]
-        others: dict[tuple[str, ...], Tried] = {}
-        for single in by_balances[:1] + sorted(singles, key=free):
-            others.setdefault(single.trial.effects, single)
-        return list(others.values())[:MOST_OTHERS]
-
-    def _as_balances_have_it(self, one: Trial) -> Tried:
-        told = fit_balances(one, self._head, self.floor)
-        return self._rounds.scored(told, free_run_score(told, self._evidence))
 
     def simplest(self, equal: list[Trial], better: list[Tried]) -> list[Trial]:
         """Return the best trials; one with fewer parameters where the whole knows nothing better.

@@ -43,18 +43,19 @@ def candidates(findings: Findings) -> tuple[CandidateResult, ...]:
     the whole best by its criterion, behind all that were simulated what explains the balances best.
     """
     plain, *others = findings.tried
-    ended = {t.effects: t for t in (findings.chosen, findings.rejected) if t is not None}
+    ended = findings.chosen if findings.rejected is None else findings.rejected
     nearest: dict[frozenset[str], tuple[float, CandidateResult]] = {}
     for tried in others:
         fitted, free_run, left, distance = tried.trial, None, None, math.inf
+        effects = frozenset(fitted.effects)
         if tried.free_run is not None:
-            fitted = ended.get(fitted.effects, fitted)
+            fitted = ended if effects == frozenset(ended.effects) else fitted
             left = math.sqrt(mean_square(fitted, findings.evidence))
             distance = free_run_score(fitted, findings.evidence, seen=0.0)
             free_run = None if plain.free_run is None else float(plain.free_run - tried.free_run)
         score = float(plain.balances - tried.balances)
         candidate = CandidateResult(fitted.name, score, free_run, left, _sizes(fitted))
-        effects, found = frozenset(fitted.effects), (distance, candidate)
+        found = distance, candidate
         nearest[effects] = min(found, nearest.get(effects, found), key=_rank)
     return tuple(candidate for _, candidate in sorted(nearest.values(), key=_rank))
 

@@ -1,40 +1,20 @@
 """What all tests share: a ROS environment of their own, and the way to the reference material."""
 
-import fcntl
-import itertools
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from domains import reserved_domain  # stands beside, in no package
 
 # Matrices are small, and threads cost more than they gain. Before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Each of pytest-xdist's processes has one core: more threads there wait for each other.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
-
-DOMAINS = range(1, 102)  # 0 is everybody's; above 101 the ports meet Linux's ephemeral ones
-_turn = itertools.islice(itertools.cycle(DOMAINS), os.getpid() % len(DOMAINS), None)
-
-
-@contextmanager
-def _reserved_domain() -> Iterator[int]:
-    """Yield a domain that no other test of this machine uses; a file lock holds it."""
-    folder = Path(tempfile.gettempdir()) / f"emir-ros-domains-{os.getuid()}"
-    folder.mkdir(exist_ok=True)
-    for domain in itertools.islice(_turn, len(DOMAINS)):
-        with (folder / str(domain)).open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            yield domain
-            return
-    pytest.fail("every ROS domain is taken by another test")
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +28,7 @@ def ros_domain(
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path_factory.getbasetemp() / "ros_log"))
     if Path(sys.prefix, "share", "ament_index").is_dir():
         monkeypatch.setenv("AMENT_PREFIX_PATH", sys.prefix, prepend=os.pathsep)
-    with _reserved_domain() as domain:
+    with reserved_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
         yield domain
 

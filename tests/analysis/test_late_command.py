@@ -1,5 +1,6 @@
 """Sensors that are all equally late are the same as a late command, which is one number."""
 
+import numpy as np
 import pytest
 from operated import moved
 
@@ -43,3 +44,17 @@ def test_sensors_that_are_late_by_times_of_their_own_stay(apart: float) -> None:
         dead_share = known.machine.effects.sensor_delay.dead_share
         lag_share = begun.machine.effects.command_delay.lag_share
         assert lag_share == pytest.approx(1.0 - dead_share)
+
+
+@pytest.mark.parametrize(("seconds", "late_sensors"), [(0.6, 4), (0.02, 1)])
+def test_what_no_late_command_can_be_stays_with_the_sensors(
+    seconds: float, late_sensors: int
+) -> None:
+    """A command comes late by 0.2 s at most, and makes every signal late, not the angle alone."""
+    known = trial(SHEET, ("sensor_delay",))
+    late = [unknown.at(seconds) for unknown in known.unknowns.members[:late_sensors]]
+    known = known.at(np.concatenate([late, known.x[late_sensors:]]))
+    paths = [unknown.path for unknown in known.unknowns.members[late_sensors:4]]
+    for path in paths:
+        known = known.fixed(path, 0.0)
+    assert late_command(known, SHEET) is None

@@ -14,10 +14,11 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.run_errors import at_rest
-from emir_analysis.diagnosis.select import EXPLAINED, excess
+from emir_analysis.diagnosis.select import EXPLAINED, at_noise, excess
 from emir_analysis.diagnosis.stick_slip import DECIDED
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
+from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 
 STARTS = np.linspace(-1.0, 1.0, 5)  # angles at rest, in half steps of the resolver
@@ -27,8 +28,11 @@ def explained(known: Trial, evidence: Evidence) -> bool:
     """Tell whether a trial's free run explains recordings: all signals together, in their noise.
 
     To within EXPLAINED times what a right model leaves: the noise, and of one that sticks the
-    difference of two runs that parted where no sensor could tell.
+    difference of two runs that parted where no sensor could tell. A series, which has terms enough
+    to stand for another effect, has to be at the noise.
     """
+    if not sticks(known) and any(REGISTRY[name].is_series for name in known.effects):
+        return at_noise(known, evidence)
     error, right = 1.0 + excess(known, evidence), 1.0
     if error > EXPLAINED**2 and sticks(known):
         right += 2.0 * parting(known.machine, evidence)

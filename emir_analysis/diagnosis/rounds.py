@@ -138,7 +138,8 @@ class Rounds:
     def ask_further(self, best: Trial) -> None:
         """Fit what was next to a series of a trial on the free run, as many as were fitted there.
 
-        A series has terms enough to stand for what comes close.
+        A series has terms enough to stand for what comes close. Where sensors are missing, what got
+        no further than the balances as well.
         """
         for effect in best.effects:
             others = frozenset(best.effects) - {effect}
@@ -147,6 +148,24 @@ class Rounds:
                 known = {frozenset(tried.trial.effects) for tried in self.tried}
                 new = [t for t in begun if frozenset(t.effects) not in known]
                 self.tried += side_by_side(self._simulated, self._all_led(new, beside))
+            if not self._evidence.complete:
+                promising = self._no_further(others)
+                self.tried += side_by_side(self._simulated, promising)
+
+    def further(self, known: Tried) -> list[Tried]:
+        """Return what is better with one effect more of what got no further than the balances.
+
+        Where sensors are missing, those that are left do not tell all that the free run knows.
+        """
+        return self._better(self._no_further(frozenset(known.trial.effects)), known)
+
+    def _no_further(self, effects: frozenset[str]) -> list[Tried]:
+        """Take out the trials with one effect more that got no further than the balances."""
+        more = [t for t in self.tried if t.free_run is None and effects < set(t.trial.effects)]
+        alike = [t for t in more if len(t.trial.effects) == len(effects) + 1]
+        taken = sorted(alike, key=lambda t: t.balances)[:MOST_SIMULATED]
+        self.tried = [t for t in self.tried if t not in taken]
+        return taken
 
     def beside_enough(self, best: Tried) -> list[Tried]:
         """Return the same beside a trial that is good enough: what takes away most of the rest.

@@ -164,8 +164,8 @@ class Search:
         """Return the best trials, or other effects that explain the whole better: as many of them.
 
         Where the best one leaves something, the part held back may have preferred it by chance, and
-        a series has terms enough to stand for another effect. Of the others that which is nearest
-        is fitted to the whole as well.
+        a series has terms enough to stand for another effect. Of the others, also of those that few
+        balances have spoken against, that which is nearest is fitted to the whole as well.
         """
         best = equal[0]
         if not best.effects or sticks(best):
@@ -325,22 +325,35 @@ class Search:
         """Return the best trials beside another effect than the best one, if they suffice.
 
         Where sensors are missing, the balances do not tell which of two the first to look beside
-        is, and the part held back knows little of it. That which says most to the balances comes
-        first, then those that are ahead in the free run.
+        is, and the part held back knows little of it. What was not simulated beside the best one
+        takes least time; then that which says most to the balances comes first, then those that
+        are ahead in the free run.
         """
+        alone = (t for t in self.tried if t.trial.effects == best.trial.effects[:1])
+        first = next(alone, best)
         singles = [t for t in self.tried if t.free_run is not None and len(t.trial.effects) == 1]
         singles = sorted(singles, key=lambda t: t.balances)[:1] + sorted(singles, key=free)
         others: dict[tuple[str, ...], Tried] = {}
         for single in singles:
             if single.trial.effects != best.trial.effects[:1]:
                 others.setdefault(single.trial.effects, single)
+        self._progress(f"further effects beside: {first.trial.name}")
+        found = self._sufficient(self._rounds.further(first))
         for other in list(others.values())[:MOST_OTHERS]:
-            self._progress(f"all effects beside: {other.trial.name}")
-            better = self._rounds.beside(other)
-            found = _as_good(better) if better else []
-            if found and self._rounds.enough(self.whole.fitted(found[0])):
-                return found
-        return []
+            if not found:
+                self._progress(f"all effects beside: {other.trial.name}")
+                found = self._sufficient(self._rounds.beside(other))
+        return found
+
+    def _sufficient(self, better: list[Tried]) -> list[Trial]:
+        """Return the best of what is better than another, if it suffices."""
+        if not better:
+            return []
+        equal = _as_good(better)
+        best = next(t for t in better if t.trial is equal[0])
+        if sticks(best.trial):
+            equal, _ = self._by_beginning(equal, best)
+        return equal if self._rounds.enough(self.whole.fitted(equal[0])) else []
 
     def simplest(self, equal: list[Trial], better: list[Tried]) -> list[Trial]:
         """Return the best trials; one with fewer parameters where the whole knows nothing better.

@@ -34,6 +34,8 @@ from emir_analysis.diagnosis.select import (
     STRONG,
     at_noise,
     balance_score,
+    beyond,
+    excess,
     free_run_score,
     limits,
     quiet,
@@ -406,6 +408,25 @@ def test_what_comes_next_is_asked_before_a_series_is_named(monkeypatch: pytest.M
     asked.tried = [asked._simulated(linkage)]
     (found,) = searched.nearest_the_whole([asked.tried[0].trial])
     assert found.effects == ("vessel_compliance",)
+
+
+def test_without_a_gauge_what_one_balance_speaks_against_is_asked_as_well() -> None:
+    """Beside a loop of the valve: of four that the balance of a chamber likes three go on."""
+    hidden = {"effects.valve_hysteresis.width": 0.05, "effects.linkage_error.scale": -0.02}
+    run = without(moved(with_values(joint1(), hidden), duration=40.0), "pressure_lifting")
+    evidence = Evidence([run], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    rounds, head = searched._rounds, evidence.head(SEEN)
+    loop = fit_balances(trial(searched._sheet, ("valve_hysteresis",)), head, searched.floor)
+    beside = ("linkage_error", "flow_gain_drift")
+    both = [trial(searched._sheet, ("valve_hysteresis", each), loop) for each in beside]
+    told, drift = (rounds.scored(fit_balances(each, head, searched.floor)) for each in both)
+    simulated = rounds._simulated(drift)
+    first = rounds.scored(loop, free_run_score(loop, evidence))
+    rounds.tried = [first, told, simulated]
+    assert excess(simulated.trial, evidence) < beyond(EXPLAINED)
+    assert searched.nearest_the_whole([simulated.trial])[0].effects == told.trial.effects
+    assert all(t.free_run is not None for t in rounds.tried)
 
 
 def test_what_acts_little_and_late_is_found() -> None:

@@ -7,7 +7,7 @@ from test_diagnosis_search import TOLERANCES
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.foresight import explained, parting
-from emir_analysis.diagnosis.select import EXPLAINED, excess
+from emir_analysis.diagnosis.select import AT_NOISE, EXPLAINED, beyond, excess
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
@@ -58,3 +58,15 @@ def test_a_free_run_that_leaves_more_than_its_bound_is_no_explanation() -> None:
     seen, other = recording(viscous, 8), model({"effects.viscous_friction.coefficient": 1.5e5})
     assert 1.0 + excess(other, seen) > EXPLAINED**2
     assert not explained(other, seen)
+
+
+def test_a_series_explains_nothing_short_of_the_noise() -> None:
+    """Its terms come close to what a payload does, say; friction may be of a law like the truth."""
+    for path, value, off, is_enough in (
+        ("effects.linkage_error.scale", 0.01, 0.0107, False),
+        ("effects.viscous_friction.coefficient", 1e5, 1.15e5, True),
+    ):
+        seen, near = recording({path: value}, 8), model({path: off})
+        assert beyond(AT_NOISE) < excess(near, seen) < beyond(EXPLAINED)
+        assert explained(near, seen) == is_enough
+        assert explained(model({path: value}), seen)

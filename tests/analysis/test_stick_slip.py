@@ -393,6 +393,18 @@ def test_a_break_away_is_looked_for_where_coulomb_s_friction_leaves_a_little(
     assert math.sqrt(mean_square(found.trial, evidence)) < LEFT
 
 
+def test_what_sticks_beside_another_first_effect_is_told_by_a_beginning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched, sheet, evidence = search(HIDDEN)
+    start = trial(sheet, ("stribeck_friction", "viscous_friction"))
+    members = start.unknowns.members
+    told = start.at(np.array([u.at(HIDDEN[u.path]) if u.path in HIDDEN else 0 for u in members]))
+    coulomb = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
+    monkeypatch.setattr(searched, "_with_friction", lambda *_: told)
+    assert searched._sufficient([Tried(coulomb, 0.0, 0.0)]) == [told]
+
+
 def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:
     """One law is the other with a parameter fixed, and no third one."""
     sheet = Sheet(joint1(), TOLERANCES, {}, ())

@@ -18,7 +18,6 @@ from emir_analysis.diagnosis.select import EXPLAINED, at_noise, excess
 from emir_analysis.diagnosis.stick_slip import DECIDED
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
-from emir_plant.effects import REGISTRY
 from emir_plant.parameters import Machine
 
 STARTS = np.linspace(-1.0, 1.0, 5)  # angles at rest, in half steps of the resolver
@@ -31,7 +30,7 @@ def explained(known: Trial, evidence: Evidence) -> bool:
     difference of two runs that parted where no sensor could tell. A series, which has terms enough
     to stand for another effect, has to be at the noise.
     """
-    if not sticks(known) and any(REGISTRY[name].is_series for name in known.effects):
+    if known.has_series and not sticks(known):
         return at_noise(known, evidence)
     error, right = 1.0 + excess(known, evidence), 1.0
     if error > EXPLAINED**2 and sticks(known):

@@ -106,13 +106,16 @@ class Rounds:
         """Return what is better on the whole with another effect in place of one of several.
 
         What came first may stand for another, which shows once what came later is known
-        (floating search, Pudil et al. 1994). full: fitted to the whole.
+        (floating search, Pudil et al. 1994). At the noise, a series alone. full: fitted to the
+        whole.
         """
         least = self.scored(full).balances - STRONG if self._evidence.complete else np.inf
         found: list[Tried] = []
+        at_all = not at_noise(full, self._evidence)
         for effect in full.effects:
             fewer = full.without(effect)
-            if frozenset(fewer.effects) not in self._asked:
+            may = at_all or REGISTRY[effect].is_series
+            if may and frozenset(fewer.effects) not in self._asked:
                 self._progress(f"all effects in place of: {effect}")
                 self._asked.add(frozenset(fewer.effects))
                 found += self._in_its_place(fewer, least)

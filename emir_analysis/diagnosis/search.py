@@ -38,7 +38,6 @@ from emir_analysis.diagnosis.stick_slip import OFF
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
-from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 MOST_EFFECTS = 3  # that are looked for in one machine
@@ -150,12 +149,14 @@ class Search:
     def _with_others_in_place(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trials with other effects in place of some of several, where better.
 
-        The same where they are at the noise, nowhere near, or stick, which takes too long.
+        The same where they are at the noise, or with a series at all of it, nowhere near, or stick,
+        which takes too long.
         """
         if not equal[0].effects[1:] or sticks(equal[0]):
             return equal
         full = self.whole.fitted(equal[0])
-        if at_noise(full, self._evidence) or self._excess(full) > beyond(HOPELESS):
+        enough = LEFT if full.has_series else AT_NOISE
+        if not beyond(enough) < self._excess(full) <= beyond(HOPELESS):
             return equal
         better = self._rounds.exchanged(full)
         return self._with_others_in_place(_as_good(better)) if better else equal
@@ -171,8 +172,7 @@ class Search:
         if not best.effects or sticks(best):
             return equal
         left = self._excess(self.whole.fitted(best))
-        series = any(REGISTRY[effect].is_series for effect in best.effects)
-        if left >= beyond(HOPELESS) or not (series or left > beyond(LEFT)):
+        if left >= beyond(HOPELESS) or not (best.has_series or left > beyond(LEFT)):
             return equal
         self._rounds.ask_further(best)
         asked = [t.trial for t in self.tried if t.free_run is not None]
@@ -181,7 +181,7 @@ class Search:
         nearest = min(others, key=self.whole.score, default=best)
         if self._excess(nearest) > beyond(EXPLAINED):
             return equal
-        plainer = self.whole.plainer if series else lambda full: full
+        plainer = self.whole.plainer if best.has_series else lambda full: full
         scores = [self.whole.score(plainer(self.whole.fitted(t))) for t in (best, nearest)]
         return [nearest] if scores[1] < scores[0] - STRONG else equal
 

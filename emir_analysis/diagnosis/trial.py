@@ -80,6 +80,11 @@ class Trial:
         machine = with_values(self.unknowns.machine, form)
         return replace(self, unknowns=replace(self.unknowns, machine=machine))
 
+    @property
+    def has_series(self) -> bool:
+        """Tell whether one of its effects is a series, with terms enough to stand for another."""
+        return any(REGISTRY[effect].is_series for effect in self.effects)
+
     def without(self, effect: str) -> "Trial":
         """Return the trial with one effect less."""
         others = tuple(name for name in self.effects if name != effect)

@@ -111,11 +111,11 @@ class Rounds:
         """
         least = self.scored(full).balances - STRONG if self._evidence.complete else np.inf
         found: list[Tried] = []
-        at_all = not at_noise(full, self._evidence)
+        spent = at_noise(full, self._evidence)
         for effect in full.effects:
             fewer = full.without(effect)
-            may = at_all or REGISTRY[effect].is_series
-            if may and frozenset(fewer.effects) not in self._asked:
+            stays = spent and not REGISTRY[effect].is_series
+            if not stays and frozenset(fewer.effects) not in self._asked:
                 self._progress(f"all effects in place of: {effect}")
                 self._asked.add(frozenset(fewer.effects))
                 found += self._in_its_place(fewer, least)

@@ -30,6 +30,7 @@ from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
     HOPELESS,
+    LEFT,
     SEEN,
     STRONG,
     at_noise,
@@ -389,6 +390,32 @@ def test_an_effect_that_stood_for_another_is_exchanged() -> None:
     assert at_noise(found, evidence)
     for path, value in hidden.items():
         assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("size", "value", "off", "places"),
+    [
+        ("linkage_error.scale", 0.01, 0.0108, ["viscous_friction"]),
+        ("payload.mass", 40.0, 41.6, []),
+    ],
+)
+def test_a_series_that_leaves_a_little_may_stand_for_another(
+    size: str, value: float, off: float, places: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another effect is asked for in its place, beside the one that stays."""
+    viscous, path = {"effects.viscous_friction.coefficient": 1e5}, f"effects.{size}"
+    searched, sheet, evidence = search(viscous | {path: value})
+    start = trial(sheet, ("viscous_friction", size.split(".", maxsplit=1)[0]))
+    values, members = viscous | {path: off}, start.unknowns.members
+    near = start.at(np.array([u.at(values[u.path]) if u.path in values else 0 for u in members]))
+    assert beyond(LEFT) < excess(near, evidence) <= beyond(AT_NOISE)
+    asked: list[str] = []
+    monkeypatch.setattr(searched.whole, "fitted", lambda known: known)
+    monkeypatch.setattr(
+        searched._rounds, "_in_its_place", lambda fewer, _: asked.append(fewer.name) or []
+    )
+    searched._with_others_in_place([near])
+    assert asked == places
 
 
 def test_what_comes_next_is_asked_before_a_series_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

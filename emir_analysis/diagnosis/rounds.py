@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.select import (
     AT_NOISE,
     EXPLAINED,
     HOPELESS,
+    LEFT,
     SEEN,
     STRONG,
     astray,
@@ -181,10 +182,25 @@ class Rounds:
         if sticks(best.trial):
             limit = (1.0 - PROMISING) * excess(best.trial, self._head)
             promising = [t for t in promising if excess(t.trial, self._head) < limit]
-        better = self._better(promising, best)
+        simulated = side_by_side(self._simulated, promising)
+        self.tried += simulated
+        better = [t for t in simulated if free(t) < free(best) - STRONG]
+        better = better or self._down_to_noise(simulated, best)
         close = min(map(free, better), default=0.0) + STRONG
         better = [t for t in better if free(t) < close]
         return [t for t in better if self._excess(self._whole.fitted(t.trial)) < least]
+
+    def _down_to_noise(self, simulated: list[Tried], best: Tried) -> list[Tried]:
+        """Return the trial nearest to the whole recordings that leaves nothing, fitted to them.
+
+        Of those that the part held back prefers, if not clearly: the other two thirds may know more
+        of an effect.
+        """
+        limit = self._whole.score(best.trial) - STRONG
+        ahead = [t for t in simulated if free(t) < free(best)]
+        nearest = sorted(ahead, key=lambda t: self._whole.score(t.trial))[:1]
+        near = [t for t in nearest if self._whole.score(t.trial) < limit]
+        return [t for t in near if self._excess(self._whole.fitted(t.trial)) <= beyond(LEFT)]
 
     def beside_explained(self, known: Trial) -> list[Tried]:
         """Return what takes a trial to the noise that explains the whole but leaves a little.

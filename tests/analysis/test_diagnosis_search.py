@@ -12,6 +12,7 @@ import recorded
 from operated import moved, operated, without
 
 from emir_analysis.closed_loop import ClosedLoop
+from emir_analysis.diagnosis import rounds as rounds_module
 from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
 from emir_analysis.diagnosis.black_box import train, train_one_step
 from emir_analysis.diagnosis.diagnose import diagnose, loudest
@@ -650,6 +651,23 @@ def test_a_third_effect_is_found_beside_a_pair_that_alone_helps() -> None:
     found = searched.whole.fitted(searched.run()[0])
     assert set(found.effects) == {"payload", "valve_gain_asymmetry", "internal_leakage"}
     assert at_noise(found, evidence)
+
+
+@pytest.mark.parametrize(("mass", "found"), [(6.0, [("viscous_friction", "payload")]), (0.0, [])])
+def test_what_brings_all_to_the_noise_is_taken_though_the_part_held_back_tells_little(
+    mass: float, found: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside an effect that explains alone; there a second one is better, if not clearly."""
+    begun = search({"effects.viscous_friction.coefficient": 1e5, "effects.payload.mass": mass})
+    searched, _, evidence = begun
+    alone = fitted(begun, "viscous_friction")
+    assert searched._rounds.enough(alone)
+    barely = {1: 100.0, 2: 100.0 - 0.5 * STRONG}
+    monkeypatch.setattr(rounds_module, "free_run_score", lambda t, _: barely[len(t.effects)])
+    better = searched._rounds.beside_enough(Tried(alone, 0.0, barely[1]))
+    assert [each.trial.effects for each in better] == found
+    for each in better:
+        assert excess(searched.whole.fitted(each.trial), evidence) < beyond(LEFT)
 
 
 def test_of_a_short_recording_a_balance_may_hold_more() -> None:

@@ -13,15 +13,14 @@ ALIKE = 0.2  # relative: more apart, and the sensors' delays are their own
 def late_command(known: Trial, sheet: Sheet) -> Trial | None:
     """Return a trial with a late command in place of sensors that are all equally late.
 
-    None where they are not, the command is late as well, or it would be later than it can be. It
-    is begun, not fitted.
+    None where they are not, or the command is late as well. It is begun, not fitted: by no more
+    than a command can be late.
     """
     if SENSOR not in known.effects or COMMAND in known.effects:
         return None
     fitted = known.unknowns.values(known.x)
-    of_each = {f"effects.{SENSOR}.{name}" for name in SENSORS}
-    measured = [u.path for u in trial(sheet, (SENSOR,)).unknowns.members if u.path in of_each]
-    delays = np.array([fitted.get(path, 0.0) for path in measured])
+    of_each = [f"effects.{SENSOR}.{name}" for name in SENSORS]
+    delays = np.array([fitted[path] for path in of_each if path in fitted])
     if np.ptp(delays) > ALIKE * np.max(delays):
         return None
     others = known.without(SENSOR)
@@ -31,6 +30,4 @@ def late_command(known: Trial, sheet: Sheet) -> Trial | None:
     places = {unknown.path: k for k, unknown in enumerate(begun.unknowns.members)}
     where = [places[f"effects.{COMMAND}.{name}"] for name in values]
     at = [begun.unknowns.members[k].at(v) for k, v in zip(where, values.values(), strict=True)]
-    if any(begun.unknowns.members[k].high < x for k, x in zip(where, at, strict=True)):
-        return None
-    return begun.at(moved(begun.x, where, at))
+    return begun.at(np.clip(moved(begun.x, where, at), *begun.unknowns.bounds))

@@ -165,7 +165,9 @@ class Rounds:
 
     def _no_further(self, effects: frozenset[str]) -> list[Tried]:
         """Take out the trials with one effect more that got no further than the balances."""
-        more = [t for t in self.tried if t.free_run is None and effects < set(t.trial.effects)]
+        simulated = {frozenset(t.trial.effects) for t in self.tried if t.free_run is not None}
+        left = [t for t in self.tried if frozenset(t.trial.effects) not in simulated]
+        more = [t for t in left if effects < set(t.trial.effects)]
         alike = [t for t in more if len(t.trial.effects) == len(effects) + 1]
         taken = sorted(alike, key=lambda t: t.balances)[:MOST_SIMULATED]
         self.tried = [t for t in self.tried if t not in taken]

@@ -17,7 +17,7 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # each is one fit: arrays have no one answer to ==
 class Trial:
     """A set of effects with fitted parameters.
 

@@ -457,6 +457,17 @@ def test_without_a_gauge_what_one_balance_speaks_against_is_asked_as_well() -> N
     assert all(t.free_run is not None for t in rounds.tried)
 
 
+def test_what_was_simulated_from_elsewhere_is_not_asked_again() -> None:
+    """Fitted to the balances first, it may have gone on from where the free run begins it."""
+    searched, sheet, _ = search(FRICTION)
+    viscous, payload = trial(sheet, ("viscous_friction",)), trial(sheet, ("payload",))
+    again = viscous.at(2.0 * viscous.x)
+    tried = [Tried(viscous, 0.0), Tried(payload, 1.0), Tried(again, 0.0, 5.0)]
+    searched._rounds.tried = tried
+    assert searched._rounds._no_further(frozenset()) == [tried[1]]
+    assert searched._rounds.tried == [tried[0], tried[2]]
+
+
 def test_what_acts_little_and_late_is_found() -> None:
     """It lowers from the last third on: parameters alone are at the noise before, and near it."""
     lifted = np.concatenate([[0.0] * 40, ([0.3] * 20 + [0.0] * 70) * 4])

@@ -12,7 +12,6 @@ bending          measured minus modelled tip deflection under the measured force
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,8 +101,7 @@ class Balances:
         self._shown = np.column_stack([experiment.angle, shown])
         self._smooth_angle, self._rate = _smoothed(experiment.angle, SMOOTHING, period)
         self._rate_slope = np.gradient(self._rate, period)
-        slopes = [_smoothed(column, LAG_SMOOTHING, period)[1] for column in shown.T]
-        self._slopes = np.column_stack([self._rate, *slopes])
+        self._slopes = dict[str, Array]()  # of what sensors show, (n,) 1/s, as asked for
         p = Plant(geometry).record[0]
         self._areas = p["area_lifting"], p["area_lowering"]
         arm = linkage.lever_arms(self._smooth_angle, p)
@@ -190,26 +188,37 @@ class Balances:
         effects = machine.effects
         angle = self._undelayed(effects, "angle", self._smooth_angle, self._rate)
         rate = self._undelayed(effects, "angle", self._rate, self._rate_slope)
+        slopes = (self._rate, None, None, None)
         columns = [
             _unscaled(effects, name, self._undelayed(effects, name, shown, slope))
             for name, shown, slope in zip(
-                ("angle", H, S, "deflection"), self._shown.T, self._slopes.T, strict=True
+                ("angle", H, S, "deflection"), self._shown.T, slopes, strict=True
             )
         ]
         angle = _unscaled(effects, "angle", angle)
         return np.column_stack([*columns, angle, rate / (1.0 + effects.sensor_gain.angle)])
 
-    def _undelayed(self, effects: Effects, sensor: str, signal: Array, slope: Array) -> Array:
-        """Return a sensor's signal, (n,), without its lag and dead time. slope: (n,) 1/s of it."""
+    def _undelayed(
+        self, effects: Effects, sensor: str, signal: Array, slope: Array | None = None
+    ) -> Array:
+        """Return a sensor's signal, (n,), without its lag and dead time.
+
+        slope: (n,) 1/s of it; of what the sensor shows, smoothed, when not given.
+        """
         late = effects.sensor_delay
         dead = late.dead_share * getattr(late, sensor)
         lag = getattr(late, sensor) - dead
         if lag > 0.0:
-            signal = signal + lag * slope
+            signal = signal + lag * (self._slope(sensor, signal) if slope is None else slope)
         if dead == 0.0:
             return signal
         time = self._experiment.time
         return np.asarray(np.interp(time + dead, time, signal))
+
+    def _slope(self, sensor: str, shown: Array) -> Array:
+        if sensor not in self._slopes:  # found when asked for, since few sensors lag
+            self._slopes[sensor] = _smoothed(shown, LAG_SMOOTHING, self._experiment.period)[1]
+        return self._slopes[sensor]
 
     def _modelled(
         self, plants: Sequence[Plant], true: Array, angle: int, longest: float
@@ -254,12 +263,8 @@ class Balances:
         if not machine.sensors.own_stroke:
             return shown
         effects = machine.effects
-        undelayed = self._undelayed(effects, "stroke", shown, self._stroke_slope)
+        undelayed = self._undelayed(effects, "stroke", shown)
         return _unscaled(effects, "stroke", undelayed)
-
-    @cached_property
-    def _stroke_slope(self) -> Array:
-        return _smoothed(self._experiment.outputs[:, 0], LAG_SMOOTHING, self._experiment.period)[1]
 
     def _missing(self, modelled: Modelled, true: Array, off: Array) -> Array:
         """Return what is missing in each balance; off: stroke beyond the machine's, (n,) m."""
@@ -372,7 +377,8 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
     draws = max(1, round(NOISE_DRAWN / float(experiment.time[-1])))
     step = machine.sensors.resolver_step
     inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
-    ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])
+    starts = [(angle + off, pressure) for off in inside]
+    ideal = free_runs([machine] * draws, experiment, starts, coarse=True)
     if not np.all(np.isfinite(ideal)):
         raise InputError(
             f"{experiment.name}: the data sheet's machine cannot rest at"

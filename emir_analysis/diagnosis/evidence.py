@@ -141,6 +141,6 @@ class Evidence:
         return np.where(told, levels, np.nan)
 
 
-@lru_cache(maxsize=2)  # floor and drawn levels are asked for of one machine
+@lru_cache(maxsize=8)  # floor and drawn levels are asked for of one machine, and some once more
 def _drawn(evidence: Evidence, machine: Machine) -> list[Array]:
     return [noise_floor(e, machine, evidence.stated) for e in evidence.experiments]

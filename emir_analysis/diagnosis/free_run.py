@@ -33,7 +33,8 @@ def free_runs(
     balance of forces, the logic block is settled. A machine that cannot rest there gives NaN.
     coarse: in twice the integration step, for half the time; good for comparing such runs.
     """
-    plants = [Plant(machine) for machine in machines]
+    made = {id(machine): Plant(machine) for machine in machines}  # one may stand there many times
+    plants = [made[id(machine)] for machine in machines]
     states = [_at_rest(plant, *start) for plant, start in zip(plants, starts, strict=True)]
     able = [k for k, state in enumerate(states) if state is not None]
     result = np.full((len(plants), experiment.angle.size, len(SHOWN)), np.nan)

@@ -80,18 +80,17 @@ def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arr
 
     def model(points: Array) -> Array:
         machines = [machine] * len(points)
-        return weighted_errors(machines, early, evidence, starts.at(points, machines))
+        at = starts.at(points, machines)
+        return weighted_errors(machines, early, evidence, at, coarse=True)
 
-    points = np.zeros((1, 2))
+    start = np.zeros(2)
     if not starts.is_told:
         points = np.column_stack([np.zeros(RESTS), np.linspace(-1.0, 1.0, RESTS)])
-    with np.errstate(over="ignore"):  # of a run out of all bounds
-        cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
-    best: Array = points[int(np.argmin(cost))]
-    if not np.isfinite(np.min(cost)):
-        return best
+        with np.errstate(over="ignore"):  # of a run out of all bounds
+            cost = np.nan_to_num(np.sum(np.square(model(points)), axis=1), nan=np.inf)
+        start = points[int(np.argmin(cost))]
     none = np.zeros(2, dtype=bool)
-    return fit(Problem(model, best, -np.ones(2), np.ones(2), none), FREE_RUN_ACCURACY).x
+    return fit(Problem(model, start, -np.ones(2), np.ones(2), none), FREE_RUN_ACCURACY).x
 
 
 def readings(evidence: Evidence) -> float:

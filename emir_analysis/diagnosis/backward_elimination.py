@@ -4,8 +4,8 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, refine_free_run
+from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.friction_laws import COULOMB, STRIBECK, sticks
-from emir_analysis.diagnosis.rounds import Rounds
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import EXPLAINED, HOPELESS, STRONG, beyond, excess
 from emir_analysis.diagnosis.side_by_side import side_by_side
@@ -20,11 +20,9 @@ class BackwardElimination:
     settled: effects that are known to be needed.
     """
 
-    def __init__(
-        self, evidence: Evidence, sheet: Sheet, whole: Whole, rounds: Rounds, progress: Progress
-    ) -> None:
+    def __init__(self, evidence: Evidence, sheet: Sheet, whole: Whole, progress: Progress) -> None:
         self._evidence, self._sheet, self._floor = evidence, sheet, evidence.floor(sheet.machine)
-        self._whole, self._rounds, self._progress = whole, rounds, progress
+        self._whole, self._progress = whole, progress
         self.settled: tuple[str, ...] = ()
 
     def needed(self, chosen: Trial, plain: Trial) -> Trial:
@@ -32,7 +30,7 @@ class BackwardElimination:
 
         plain: the parameters alone, fitted to the whole free run.
         """
-        if not chosen.effects or not self._rounds.enough(self._whole.fitted(chosen)):
+        if not chosen.effects or not is_enough(self._whole.fitted(chosen), self._evidence):
             return chosen
         full = self._whole.fitted(chosen)
         least = self._whole.score(full) + STRONG
@@ -61,7 +59,7 @@ class BackwardElimination:
 
     def _as_good_as(self, least: float, fitted: list[Trial]) -> list[Trial]:
         """Return those that explain enough and whose score of the whole is below least."""
-        return [t for t in fitted if self._whole.score(t) < least and self._rounds.enough(t)]
+        return [t for t in fitted if self._whole.score(t) < least and is_enough(t, self._evidence)]
 
     def _anew(self, behind: list[Trial], full: Trial, plain: Trial) -> list[Trial]:
         """Return trials that are behind a fuller one fitted anew beside parameters alone.

@@ -17,7 +17,6 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.mounting import spring_in_series
-from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.search import Search
 from emir_analysis.diagnosis.select import LEFT, at_noise, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import Shape, best_shape
@@ -25,6 +24,7 @@ from emir_analysis.diagnosis.swing import Swing, swing
 from emir_analysis.diagnosis.telling import open_shares
 from emir_analysis.diagnosis.time_limit import TimeLimit
 from emir_analysis.diagnosis.trial import Trial
+from emir_analysis.diagnosis.tried import Tried
 from emir_analysis.diagnosis.unnamed import Curves
 from emir_analysis.diagnosis.where import Where, where
 from emir_analysis.diagnosis.whole import Progress

@@ -14,13 +14,18 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.run_errors import at_rest
-from emir_analysis.diagnosis.select import EXPLAINED, at_noise, excess
+from emir_analysis.diagnosis.select import EXPLAINED, at_noise, excess, leaves_quiet
 from emir_analysis.diagnosis.stick_slip import DECIDED
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
 
 STARTS = np.linspace(-1.0, 1.0, 5)  # angles at rest, in half steps of the resolver
+
+
+def is_enough(known: Trial, evidence: Evidence) -> bool:
+    """Tell whether a trial leaves no balance speaking and explains the free run."""
+    return leaves_quiet(known, evidence) and explained(known, evidence)
 
 
 def explained(known: Trial, evidence: Evidence) -> bool:

@@ -1,26 +1,22 @@
 """One round of a search: which trials with an effect more are better than the best so far."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-
 import numpy as np
 
-from emir_analysis.diagnosis.balances import FORCE, level
+from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.candidate import Screened
-from emir_analysis.diagnosis.effect_shapes import at_other_ends
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import SHORTEST
-from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, with_fewer_terms
-from emir_analysis.diagnosis.foresight import explained
+from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
+from emir_analysis.diagnosis.free_run_fits import FreeRunFits
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.late_end import with_a_late_end
-from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.screening import OnBalances, screen_faint_load, screen_free_run
+from emir_analysis.diagnosis.late_effects import LateEffects
+from emir_analysis.diagnosis.screening import OnBalances, screen_free_run
 from emir_analysis.diagnosis.select import (
-    AT_NOISE,
     EXPLAINED,
     HOPELESS,
     LEFT,
+    MOST,
+    PROMISING,
     SEEN,
     STRONG,
     astray,
@@ -33,6 +29,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.tried import Tried, free
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.signals import Array
 from emir_plant.effects import REGISTRY
@@ -40,21 +37,7 @@ from emir_plant.sheet import Sheet
 
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
-PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
-MOST = 0.5  # share of the rest that is most of it
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A trial and its scores on the balances and on the unseen free run; smaller is better.
-
-    free_run: None where the balances already spoke against it.
-    """
-
-    trial: Trial
-    balances: float
-    free_run: float | None = None
 
 
 class Rounds:
@@ -68,6 +51,8 @@ class Rounds:
     ) -> None:
         self._evidence, self._sheet, self._floor = evidence, sheet, floor
         self._whole, self._progress = whole, progress
+        self._fits = FreeRunFits(evidence, floor, progress)
+        self._late = LateEffects(evidence, sheet, whole, self.scored, progress)
         self._head = evidence.head(SEEN)
         self.tried: list[Tried] = []
         self._asked: set[frozenset[str]] = set()  # effects beside which another was looked for
@@ -81,8 +66,8 @@ class Rounds:
         """
         self._asked.add(frozenset(best.trial.effects))
         if at_noise(best.trial, self._head):
-            return self._in_held_back(best) or self._one_more(best)
-        return self._one_more(best) or self._acting_late(best)
+            return self._kept(self._late.in_held_back(best)) or self._one_more(best)
+        return self._one_more(best) or self._kept(self._late.beside(best, self.tried))
 
     def _one_more(self, best: Tried) -> list[Tried]:
         """Return what is better with one effect more on what the fits see.
@@ -135,7 +120,7 @@ class Rounds:
         begun = self._fitted_to_balances(self._on_balances(known).singles)
         close = sorted((t for t in begun if t.balances < least), key=lambda t: t.balances)
         promising = close[:MOST_SIMULATED]
-        found = side_by_side(self._simulated, promising)
+        found = side_by_side(self._fits.fitted, promising)
         self.tried += found + [t for t in begun if t not in promising]
         return found
 
@@ -151,10 +136,10 @@ class Rounds:
                 beside, begun = self._next.pop(others)
                 known = {frozenset(tried.trial.effects) for tried in self.tried}
                 new = [t for t in begun if frozenset(t.effects) not in known]
-                self.tried += side_by_side(self._simulated, self._all_led(new, beside))
+                self.tried += side_by_side(self._fits.fitted, self._all_led(new, beside))
             if not self._evidence.complete:
                 promising = self._no_further(others)
-                self.tried += side_by_side(self._simulated, promising)
+                self.tried += side_by_side(self._fits.fitted, promising)
 
     def further(self, known: Tried) -> list[Tried]:
         """Return what is better with one effect more of what got no further than the balances.
@@ -184,7 +169,7 @@ class Rounds:
         if sticks(best.trial):
             limit = (1.0 - PROMISING) * excess(best.trial, self._head)
             promising = [t for t in promising if excess(t.trial, self._head) < limit]
-        simulated = side_by_side(self._simulated, promising)
+        simulated = side_by_side(self._fits.fitted, promising)
         self.tried += simulated
         better = [t for t in simulated if free(t) < free(best) - STRONG]
         better = better or self._down_to_noise(simulated, best)
@@ -207,23 +192,9 @@ class Rounds:
     def beside_explained(self, known: Trial) -> list[Tried]:
         """Return what takes a trial to the noise that explains the whole but leaves a little.
 
-        What acts in the part held back, and hardly before, only the whole knows: the part that the
-        fits see is at the noise without. known: fitted to the whole.
+        known: fitted to the whole.
         """
-        if at_noise(known, self._evidence) or not self.enough(known):
-            return []
-        self._progress(f"all effects in the whole recording beside: {known.name}")
-        least = self._whole.score(known) - STRONG
-        limit = MOST * self._excess(known)
-        found = [
-            self.scored(fitted, free_run_score(fitted, self._evidence))
-            for fitted in self._promising(known, self._evidence, limit)
-            if self._whole.score(fitted) < least
-            and at_noise(fitted, self._evidence)
-            and self.enough(fitted)
-        ]
-        self.tried += found
-        return found
+        return self._kept(self._late.beside_explained(known))
 
     def quiet_pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far of two effects that leave no balance speaking.
@@ -253,10 +224,6 @@ class Rounds:
             found += self._on_balances(told).singles
         return self._by_balances(sorted(found, key=lambda s: s.cost), best)
 
-    def enough(self, tried: Trial) -> bool:
-        """Tell whether a trial leaves no balance speaking and explains the free run."""
-        return self._quiet(tried) and explained(tried, self._evidence)
-
     def triples(self, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with an effect more than the best pair.
 
@@ -281,56 +248,9 @@ class Rounds:
         """Return a trial with its scores; free_run: if it is known."""
         return Tried(tried, balance_score(tried, self._evidence, self._floor), free_run)
 
-    def _acting_late(self, best: Tried) -> list[Tried]:
-        """Return what suffices with an effect that acts in the part held back alone.
-
-        Beside the best so far, or beside what explains with one effect more all that the fits see.
-        """
-        late = self._in_held_back(best)
-        if late:
-            return late
-        more = [t for t in self.tried if set(t.trial.effects) > set(best.trial.effects)]
-        told = [t for t in more if t.free_run is not None and at_noise(t.trial, self._head)]
-        nearest = min(told, key=lambda t: excess(t.trial, self._head), default=None)
-        return [] if nearest is None else self._in_held_back(nearest)
-
-    def _in_held_back(self, best: Tried) -> list[Tried]:
-        """Return what suffices with one effect more that acts in the part held back alone.
-
-        The part that the fits see is explained without, so that nothing there asks for it. Where
-        it sticks that part has to be at the noise: else it is the law that is off.
-        """
-        most = AT_NOISE if sticks(best.trial) else EXPLAINED
-        if excess(best.trial, self._head) > beyond(most) or self.enough(best.trial):
-            return []
-        near = self._evidence.until(astray(best.trial, self._evidence) + SHORTEST)
-        limit = (1.0 - PROMISING) * excess(best.trial, near)
-        found = [
-            self.scored(fitted, free_run_score(fitted, self._evidence))
-            for fitted in self._promising(best.trial, near, limit)
-            if self._suffices(fitted, best.trial)
-        ]
+    def _kept(self, found: list[Tried]) -> list[Tried]:
         self.tried += found
         return found
-
-    def _promising(self, known: Trial, evidence: Evidence, limit: float) -> Iterator[Trial]:
-        """Yield trials with one effect more that leave less than a limit, fitted to the whole.
-
-        evidence: in whose free run they are looked for. Once one suffices, only those are fitted
-        that are at the noise there as they are begun. A faint load is asked about where none is.
-        """
-        told = explains = False
-        for screened in screen_free_run(known, self._sheet, evidence)[:MOST_SIMULATED]:
-            most = beyond(AT_NOISE) if told else limit
-            if excess(screened.trial, evidence) < most:
-                fitted = self._whole.fitted_from(screened.trial)
-                yield fitted
-                told = told or self.enough(fitted)
-                explains = explains or at_noise(fitted, self._evidence)
-        if self._evidence.told[FORCE] and not explains and LOAD not in known.effects:
-            loaded = screen_faint_load(known, self._sheet, evidence).trial
-            if excess(loaded, evidence) < limit:
-                yield self._whole.fitted_from(loaded)
 
     def _on_balances(self, known: Trial) -> OnBalances:
         """Return each effect begun beside a trial; beside none they are asked for twice."""
@@ -428,82 +348,14 @@ class Rounds:
 
     def _better(self, promising: list[Tried], best: Tried) -> list[Tried]:
         """Fit trials to the free run; return those that are better than the best so far."""
-        simulated = side_by_side(self._simulated, promising)
+        simulated = side_by_side(self._fits.fitted, promising)
         self.tried += simulated
         better = [t for t in simulated if free(t) < free(best) - STRONG]
-        better = better or [t for t in simulated if self._suffices(t.trial, best.trial)]
-        return better or self._late(simulated, best)
-
-    def _late(self, simulated: list[Tried], best: Tried) -> list[Tried]:
-        """Return the trial nearest to the whole recordings, fitted to them, if that suffices.
-
-        What acts in the part held back alone, as play that opens there, no fit has seen. One that
-        is no nearer than the best so far is not fitted: that takes long.
-        """
-        limit = self._whole.score(best.trial) - STRONG
-        nearest = min(simulated, key=lambda t: self._whole.score(t.trial), default=None)
-        if nearest is None or self._whole.score(nearest.trial) >= limit:
-            return []
-        fitted = replace(nearest, trial=self._whole.fitted(nearest.trial))
-        return [fitted] if self._suffices(fitted.trial, best.trial) else []
-
-    def _simulated(self, tried: Tried) -> Tried:
-        """Return a trial fitted to the free run.
-
-        Of several sizes of an effect one alone is taken where the others are not worth their while.
-        A load may have ended since. Where all that leads nowhere near, what else is missing drives
-        the free run away and the parameters with it: they stay as the balances say, if those are
-        all told. Nor do fewer terms of a series lead anywhere then.
-        """
-        self._progress(f"free run: {tried.trial.name}")
-        full = self._with_shares_told(tried.trial, fit_free_run(tried.trial, self._head))
-        hopeless = excess(full, self._head) > beyond(HOPELESS)
-        if self._evidence.complete and hopeless:
-            return replace(tried, free_run=free_run_score(full, self._evidence))
-        ways = [full]
-        for effect in full.effects:
-            if REGISTRY[effect].is_series:
-                ways += [] if hopeless else with_fewer_terms(full, effect, self._head)
-            else:
-                ways += full.with_each_size(effect)
-        if LOAD in full.effects:
-            ways += [with_a_late_end(way, self._evidence, SEEN) for way in ways]
-        scores = [free_run_score(way, self._evidence) for way in ways]
-        best_way = int(np.argmin(scores))
-        return Tried(ways[best_way], tried.balances, scores[best_way])
-
-    def _with_shares_told(self, balanced: Trial, full: Trial) -> Trial:
-        """Return a trial fitted to the free run, or the same with a share at an end, if better.
-
-        balanced: the same fitted to the balances. Where those are quiet and the free run is not
-        explained, a share that they do not tell may have led it astray.
-        """
-        told = excess(full, self._head) <= beyond(EXPLAINED)
-        if told or sticks(full) or not self._quiet(balanced):
-            return full
-        ends = side_by_side(self._fitted_twice, at_other_ends(balanced, full))
-        return min([full, *ends], key=lambda one: excess(one, self._head))
-
-    def _fitted_twice(self, begun: Trial) -> Trial:
-        """Return a trial fitted to the balances and, where they are quiet, to the free run."""
-        told = fit_balances(begun, self._head, self._floor)
-        return fit_free_run(told, self._head) if self._quiet(told) else told
-
-    def _suffices(self, tried: Trial, best: Trial) -> bool:
-        """Tell whether the whole recordings need no more than a trial, and that far more than best.
-
-        For recordings too short for a part held back to tell: nothing may move in it.
-        """
-        better = self._whole.score(tried) < self._whole.score(best) - STRONG
-        return better and not self.enough(best) and self.enough(tried)
+        better = better or [t for t in simulated if self._late.suffices(t.trial, best.trial)]
+        return better or self._late.nearest(simulated, best)
 
     def _quiet(self, tried: Trial) -> bool:
         return leaves_quiet(tried, self._evidence)
 
     def _excess(self, tried: Trial) -> float:
         return excess(tried, self._evidence)
-
-
-def free(tried: Tried) -> float:
-    """Return the score on the unseen free run, infinite where there is none."""
-    return float("inf") if tried.free_run is None else tried.free_run

@@ -14,11 +14,12 @@ from emir_analysis.diagnosis.fitting import (
     following,
     refine_free_run,
 )
+from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
 from emir_analysis.diagnosis.friction_laws import fullest, nested, sticks
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import Misstated
-from emir_analysis.diagnosis.rounds import Rounds, Tried, free
+from emir_analysis.diagnosis.rounds import Rounds
 from emir_analysis.diagnosis.run_errors import free_run_errors
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -36,6 +37,7 @@ from emir_analysis.diagnosis.select import (
 )
 from emir_analysis.diagnosis.stick_slip import OFF
 from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.tried import Tried, free
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
 from emir_plant.sheet import Sheet
@@ -65,7 +67,7 @@ class Search:
         self.whole = Whole(evidence, sheet, self.floor, progress)
         self.misstated = Misstated(self.balanced, evidence, self.floor, progress)
         self._rounds = Rounds(evidence, sheet, self.floor, self.whole, progress)
-        self.elimination = BackwardElimination(evidence, sheet, self.whole, self._rounds, progress)
+        self.elimination = BackwardElimination(evidence, sheet, self.whole, progress)
         self._equal: dict[tuple[str, ...], list[Trial]] = {}  # the best of each round, by effects
         self._begun: set[tuple[str, ...]] = set()  # laws of friction that a beginning has told
 
@@ -116,7 +118,7 @@ class Search:
         equal, enough = (late, True) if late else (equal, enough)
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._by_beginning(equal, best, LEFT)
-            enough = self._rounds.enough(best.trial)
+            enough = is_enough(best.trial, self._evidence)
         if enough or not (self.misstated.better_than(best.trial) or self.drifting):
             if not enough:
                 equal = self._two_at_once(plain, best) or equal
@@ -242,7 +244,7 @@ class Search:
             best = self._known_whole(next(t for t in better if t.trial is equal[0]))
             if sticks(best.trial) and self._excess(best.trial) < beyond(HOPELESS):
                 equal, best = self._by_beginning(equal, best)
-            enough = self._rounds.enough(best.trial)
+            enough = is_enough(best.trial, self._evidence)
             many = len(best.trial.effects) >= MOST_BESIDE_ENOUGH
             if enough and (many or self._excess(best.trial) <= beyond(LEFT)):
                 break
@@ -285,7 +287,7 @@ class Search:
         self._progress(f"all effects beside what the balances prefer: {told.name}")
         other = self._rounds.scored(told, free_run_score(told, self._evidence))
         better = self._rounds.beside(other)
-        suffices = better and self._rounds.enough(self.whole.fitted(_as_good(better)[0]))
+        suffices = better and is_enough(self.whole.fitted(_as_good(better)[0]), self._evidence)
         return better if suffices else []
 
     def _quiet_pairs(self, plain: Tried, single: Tried) -> list[Tried]:
@@ -317,7 +319,7 @@ class Search:
         if sticks(pair.trial):  # however far off: where it sticks drives it away
             equal, pair = self._by_beginning(equal, pair)
         pair = self._known_whole(pair)
-        if not self._rounds.enough(pair.trial):
+        if not is_enough(pair.trial, self._evidence):
             _, equal, _ = self._one_at_a_time(pair, equal)
         return equal
 
@@ -353,7 +355,7 @@ class Search:
         best = next(t for t in better if t.trial is equal[0])
         if sticks(best.trial):
             equal, _ = self._by_beginning(equal, best)
-        return equal if self._rounds.enough(self.whole.fitted(equal[0])) else []
+        return equal if is_enough(self.whole.fitted(equal[0]), self._evidence) else []
 
     def simplest(self, equal: list[Trial], better: list[Tried]) -> list[Trial]:
         """Return the best trials; one with fewer parameters where the whole knows nothing better.

@@ -12,18 +12,18 @@ import recorded
 from operated import moved, operated, without
 
 from emir_analysis.closed_loop import ClosedLoop
-from emir_analysis.diagnosis import rounds as rounds_module
+from emir_analysis.diagnosis import free_run_fits
 from emir_analysis.diagnosis.balances import BALANCES, Balances, level, sensed
 from emir_analysis.diagnosis.black_box import train, train_one_step
 from emir_analysis.diagnosis.diagnose import diagnose, loudest
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, refine_free_run
+from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
-from emir_analysis.diagnosis.rounds import Tried, free
 from emir_analysis.diagnosis.run_errors import at_rest, mean_square
 from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.search import Search
@@ -47,6 +47,7 @@ from emir_analysis.diagnosis.starts import Starts
 from emir_analysis.diagnosis.statement import closest, statement, verdict
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.trial import moved as changed
+from emir_analysis.diagnosis.tried import Tried, free
 from emir_analysis.diagnosis.unknowns import unknowns
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms
@@ -433,7 +434,7 @@ def test_what_comes_next_is_asked_before_a_series_is_named(monkeypatch: pytest.M
     searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
     asked = searched._rounds
     linkage, *_ = asked._on_free_run(asked.scored(searched._plain()))
-    asked.tried = [asked._simulated(linkage)]
+    asked.tried = [asked._fits.fitted(linkage)]
     (found,) = searched.nearest_the_whole([asked.tried[0].trial])
     assert found.effects == ("vessel_compliance",)
 
@@ -449,7 +450,7 @@ def test_without_a_gauge_what_one_balance_speaks_against_is_asked_as_well() -> N
     beside = ("linkage_error", "flow_gain_drift")
     both = [trial(searched._sheet, ("valve_hysteresis", each), loop) for each in beside]
     told, drift = (rounds.scored(fit_balances(each, head, searched.floor)) for each in both)
-    simulated = rounds._simulated(drift)
+    simulated = rounds._fits.fitted(drift)
     first = rounds.scored(loop, free_run_score(loop, evidence))
     rounds.tried = [first, told, simulated]
     assert excess(simulated.trial, evidence) < beyond(EXPLAINED)
@@ -672,9 +673,9 @@ def test_what_brings_all_to_the_noise_is_taken_though_the_part_held_back_tells_l
     begun = search({"effects.viscous_friction.coefficient": 1e5, "effects.payload.mass": mass})
     searched, _, evidence = begun
     alone = fitted(begun, "viscous_friction")
-    assert searched._rounds.enough(alone)
+    assert is_enough(alone, searched._evidence)
     barely = {1: 100.0, 2: 100.0 - 0.5 * STRONG}
-    monkeypatch.setattr(rounds_module, "free_run_score", lambda t, _: barely[len(t.effects)])
+    monkeypatch.setattr(free_run_fits, "free_run_score", lambda t, _: barely[len(t.effects)])
     better = searched._rounds.beside_enough(Tried(alone, 0.0, barely[1]))
     assert [each.trial.effects for each in better] == found
     for each in better:

@@ -30,11 +30,11 @@ from emir_analysis.diagnosis.friction_laws import (
     nested,
 )
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
-from emir_analysis.diagnosis.rounds import Tried
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT, at_noise
 from emir_analysis.diagnosis.stick_slip import Grown, Growths, Led
 from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.tried import Tried
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1

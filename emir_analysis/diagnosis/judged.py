@@ -12,8 +12,9 @@ from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import free_run, free_run_errors
-from emir_analysis.diagnosis.select import EXPLAINED, at_noise, leaves_quiet
+from emir_analysis.diagnosis.select import EXPLAINED, HELPS, HOPELESS, at_noise, leaves_quiet
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import column_rms, rms
 from emir_analysis.signals import Array
@@ -23,6 +24,7 @@ STAGES = ("nominal", "refitted", "with_effect")
 NOMINAL, REFITTED = STAGES[:2]
 BLACK_BOX = "black_box"
 WITHIN = 3.0  # standard deviations, within which a size is the same
+OF_ONE_RUN = {LOAD, "flow_gain_drift"}  # come when they come, in each recording
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,20 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     asked = findings.verdict in {"nothing_missing", "found"} and not sticks(findings.chosen)
     reconciled = asked and surprising and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
+
+
+def carries(findings: Findings, judged: Judged) -> bool:
+    """Tell whether the effects found are the machine's, as far as the judge recordings know.
+
+    One that is takes away of what parameters alone leave in every recording, or leaves little, or
+    does so with other parameters. Not asked of what comes in one recording only, or of what sticks,
+    which may part from any model.
+    """
+    effects, off = findings.chosen.effects, judged.off(STAGES[-1])
+    if not effects or OF_ONE_RUN.intersection(effects) or sticks(findings.chosen):
+        return True
+    needless = judged.reconciled or not off > HOPELESS
+    return needless or off < HELPS * judged.off(REFITTED)
 
 
 def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:

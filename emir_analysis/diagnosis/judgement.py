@@ -7,7 +7,14 @@ import numpy as np
 from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve, visited_by
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.experiment import OUTPUTS
-from emir_analysis.diagnosis.judged import NOMINAL, REFITTED, STAGES, Judged, loudest_signal
+from emir_analysis.diagnosis.judged import (
+    NOMINAL,
+    REFITTED,
+    STAGES,
+    Judged,
+    carries,
+    loudest_signal,
+)
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 
@@ -28,9 +35,6 @@ def judgement(findings: Findings, judged: Judged) -> str:
     if not judged.surprising:
         return ""
     off, judge = judged.off(STAGES[-1]), judged.evidence.name
-    worse = ""
-    if findings.chosen.effects and off > judged.off(REFITTED):
-        worse = f", more than parameters alone ({judged.off(REFITTED):.1f})"
     more = f"shows more{_elsewhere(findings, judged)}"
     if judged.reconciled and findings.chosen.effects:
         more += (
@@ -43,7 +47,16 @@ def judgement(findings: Findings, judged: Judged) -> str:
     advice = "diagnose from that too"
     if off > ANOTHER and not judged.reconciled:
         advice = "see whether it is of the same machine, then " + advice
-    return f"; but {judge}, {_off(findings, judged)}{worse}, {more}: {advice}"
+    left = _off(findings, judged) + _no_better(findings, judged)
+    return f"; but {judge}, {left}, {more}: {advice}"
+
+
+def _no_better(findings: Findings, judged: Judged) -> str:
+    """Return that parameters alone do as well there, if they do."""
+    off, alone = judged.off(STAGES[-1]), judged.off(REFITTED)
+    if findings.chosen.effects and off > alone:
+        return f", more than parameters alone ({alone:.1f})"
+    return "" if carries(findings, judged) else f", hardly less than parameters alone ({alone:.1f})"
 
 
 def _foreseen(findings: Findings, judged: Judged) -> str:

@@ -20,6 +20,7 @@ EXPLAINED = 2.0  # times the sensor noise: free-run error up to which a model ex
 HOPELESS = 5.0  # times the sensor noise, beyond which a model is not near the truth
 PROMISING = 0.3  # share of the rest; a quarter of the step to where all is gone takes 0.44 away
 MOST = 0.5  # share of the rest that is most of it
+HELPS = 0.9  # of what parameters alone leave: what leaves more does not come close
 FEWEST_DRAWN = 8  # draws of the noise, from which on they tell how much a balance varies by chance
 CORRELATION_TIME = 1.0  # s: errors closer than this are not counted as independent
 

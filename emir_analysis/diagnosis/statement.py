@@ -10,21 +10,20 @@ from emir_analysis.diagnosis.diagnose import Findings, loudest
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, Experiment
 from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.judged import Judged
+from emir_analysis.diagnosis.judged import Judged, carries
 from emir_analysis.diagnosis.judgement import judgement
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.moments import Moments, moments
 from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.remainder import remainder
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
-from emir_analysis.diagnosis.select import EXPLAINED, at_noise
+from emir_analysis.diagnosis.select import EXPLAINED, HELPS, at_noise
 from emir_analysis.diagnosis.telling import movement
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import declared
 
 MANY = 0.1  # share of the samples
-HELPS = 0.9  # of what parameters alone leave: what leaves more does not come close
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
 MOSTLY = 0.5  # of a load, vertical
@@ -35,10 +34,13 @@ CLOCK = 0.02  # s, more than the same transducers and filters make of two pressu
 def verdict(findings: Findings, judged: Judged) -> str:
     """Return the verdict: nothing is not missing where the judge recordings show something.
 
-    They show nothing where other parameters inside the tolerances explain them, too.
+    They show nothing where other parameters inside the tolerances explain them, too. Nor is found
+    what explains the recordings that were fitted alone.
     """
     surprised = judged.surprising and not judged.reconciled
     if findings.verdict == "nothing_missing" and surprised:
+        return "unexplained"
+    if findings.verdict == "found" and not carries(findings, judged):
         return "unexplained"
     return findings.verdict
 
@@ -48,6 +50,8 @@ def statement(findings: Findings, judged: Judged) -> str:
     words = _of_findings(findings)
     if findings.verdict == "nothing_missing" and judged.surprising:
         words = f"of {findings.evidence.name}, {words}"
+    if findings.verdict == "found" and not carries(findings, judged):
+        words = f"of {findings.evidence.name} alone, {words}"
     return words + judgement(findings, judged) + _stopped(findings)
 
 

@@ -318,6 +318,24 @@ def test_a_judge_recording_in_which_the_machine_cannot_rest_is_said_to_be_one() 
     assert "where it cannot even rest" in statement(found, judgement)
 
 
+@pytest.mark.parametrize(
+    ("payload", "bias", "said"), [(200.0, 3e-4, "found"), (0.0, 0.0, "unexplained")]
+)
+def test_what_explains_one_recording_alone_is_not_found(
+    payload: float, bias: float, said: str
+) -> None:
+    """A payload takes away of what another recording shows, if there is one, whatever else."""
+    _, sheet, evidence = search({"effects.payload.mass": 200.0})
+    found = diagnose(evidence.experiments, sheet, lambda _: None)
+    assert (found.verdict, found.chosen.effects) == ("found", ("payload",))
+    there = {"effects.payload.mass": payload, "effects.sensor_bias.deflection": bias}
+    judgement = judged(found, search(there)[2].experiments)
+    assert judgement.off("with_effect") > HOPELESS
+    assert verdict(found, judgement) == said
+    alone = f"of {evidence.name} alone, payload; but"
+    assert statement(found, judgement).startswith(alone) == (said == "unexplained")
+
+
 def test_a_load_of_one_recording_may_not_be_another_s() -> None:
     _, sheet, evidence = search({})
     found = diagnose(evidence.experiments, sheet, lambda _: None)

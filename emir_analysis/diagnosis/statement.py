@@ -51,7 +51,7 @@ def statement(findings: Findings, judged: Judged) -> str:
     if findings.verdict == "nothing_missing" and judged.surprising:
         words = f"of {findings.evidence.name}, {words}"
     if findings.verdict == "found" and not carries(findings, judged):
-        words = f"of {findings.evidence.name} alone, {words}"
+        words = f"in {findings.evidence.name} alone explained by {words}"
     return words + judgement(findings, judged) + _stopped(findings)
 
 

@@ -332,7 +332,7 @@ def test_what_explains_one_recording_alone_is_not_found(
     judgement = judged(found, search(there)[2].experiments)
     assert judgement.off("with_effect") > HOPELESS
     assert verdict(found, judgement) == said
-    alone = f"of {evidence.name} alone, payload; but"
+    alone = f"in {evidence.name} alone explained by payload; but"
     assert statement(found, judgement).startswith(alone) == (said == "unexplained")
 
 

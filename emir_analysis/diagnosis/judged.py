@@ -92,8 +92,8 @@ def carries(findings: Findings, judged: Judged) -> bool:
     effects, off = findings.chosen.effects, judged.off(STAGES[-1])
     if not effects or OF_ONE_RUN.intersection(effects) or sticks(findings.chosen):
         return True
-    needless = judged.reconciled or not off > HOPELESS
-    return needless or off < HELPS * judged.off(REFITTED)
+    surprised = off > HOPELESS and not judged.reconciled
+    return not (surprised and off >= HELPS * judged.off(REFITTED))  # NaN: it cannot rest there
 
 
 def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:

@@ -8,6 +8,7 @@ import pytest
 from emir_analysis.diagnosis import judgement, statement
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.curves import Curve
+from emir_analysis.diagnosis.judged import carries
 from emir_analysis.diagnosis.judgement import _beyond, _foreseen, _furthest
 from emir_analysis.diagnosis.remainder import _beside, remainder
 from emir_analysis.diagnosis.statement import _rejected, other_reasons
@@ -86,6 +87,21 @@ def test_a_recording_far_off_may_be_another_machine_s(
     said = judgement.judgement(findings, judged)
     assert ("see whether it is of the same machine" in said) == asked
     assert said.endswith("diagnose from that too")
+
+
+@pytest.mark.parametrize(
+    ("off", "alone", "carried"),
+    [(9.0, 9.5, False), (9.0, 20.0, True), (4.0, 4.0, True), (9.0, np.nan, True)],
+)
+def test_an_effect_carries_to_a_recording_where_it_helps(
+    off: float, alone: float, *, carried: bool
+) -> None:
+    """Or leaves little; and one without which the machine cannot even rest there helps."""
+    findings = SimpleNamespace(chosen=SimpleNamespace(effects=("payload",)))
+    judged = SimpleNamespace(
+        reconciled=False, off={"with_effect": off, "refitted": alone}.__getitem__
+    )
+    assert carries(findings, judged) == carried
 
 
 @pytest.mark.parametrize(

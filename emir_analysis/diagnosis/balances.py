@@ -377,8 +377,7 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
     draws = max(1, round(NOISE_DRAWN / float(experiment.time[-1])))
     step = machine.sensors.resolver_step
     inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
-    starts = [(angle + off, pressure) for off in inside]
-    ideal = free_runs([machine] * draws, experiment, starts, coarse=True)
+    ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])
     if not np.all(np.isfinite(ideal)):
         raise InputError(
             f"{experiment.name}: the data sheet's machine cannot rest at"

@@ -580,7 +580,7 @@ def test_a_share_that_no_balance_tells_is_told_by_the_free_run() -> None:
     k = [unknown.path for unknown in balanced.unknowns.members].index(share)
     astray = balanced.at(changed(balanced.x, [k], [0.0]))
     assert mean_square(astray, head) > EXPLAINED**2
-    told = rounds._with_shares_told(balanced, astray)
+    told = rounds._fits._with_shares_told(balanced, astray)
     assert mean_square(told, head) < AT_NOISE**2
     found = told.machine.effects.valve_hysteresis
     assert (found.width, found.command_share) == (pytest.approx(0.03, rel=0.01), 1.0)

@@ -75,6 +75,7 @@ def settled(machine: Machine, experiment: Experiment, evidence: Evidence) -> Arr
     """Return the state `at_rest` as the two numbers of `Starts`.
 
     Where no sensor tells p_S it may be anywhere, so the fit begins at the best of several.
+    The runs are coarse.
     """
     early, starts = experiment.until(SETTLING), Starts(experiment, evidence)
 

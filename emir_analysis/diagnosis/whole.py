@@ -68,6 +68,10 @@ class Whole:
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
+    def fitted_score(self, chosen: Trial) -> float:
+        """Return the score of a trial fitted to the free run of the whole recordings."""
+        return self.score(self.fitted(chosen))
+
     def fitted_from(self, begun: Trial) -> Trial:
         """Return a trial fitted from where it is begun, if that is better than what is known.
 

@@ -648,7 +648,7 @@ def test_a_leak_that_the_balances_hardly_know_of_is_found_beside_soft_oil() -> N
         rounds.tried.append(rounds.scored(single, free_run_score(single, evidence)))
     _, play, soft = rounds.tried
     assert play.balances > soft.balances + STRONG
-    better = searched._with_one_more(play, enough=False)
+    better = searched._forward._with_one_more(play, enough=False)
     found = searched.whole.fitted(min(better, key=free).trial)
     assert set(found.effects) == {"vessel_compliance", "external_leakage"}
     assert at_noise(found, evidence)
@@ -843,7 +843,7 @@ def test_a_late_command_is_simpler_than_four_late_sensors(
         fit_free_run(fit_balances(trial(sheet, (name,)), head, searched.floor), head)
         for name in ("sensor_delay", "command_delay")
     ]
-    chosen = searched.simplest(trials[:1], [Tried(each, 0.0) for each in trials])
+    chosen = searched._forward.simplest(trials[:1], [Tried(each, 0.0) for each in trials])
     assert [each.effects for each in chosen] == [(named,)]
 
 

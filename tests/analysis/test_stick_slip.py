@@ -8,8 +8,7 @@ import recorded
 from operated import operated
 from test_diagnosis_search import TOLERANCES, search
 
-from emir_analysis.diagnosis import friction_beginning, stick_slip
-from emir_analysis.diagnosis import search as search_module
+from emir_analysis.diagnosis import friction_beginning, friction_told, stick_slip
 from emir_analysis.diagnosis import whole as whole_module
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Solution, descended
@@ -386,9 +385,9 @@ def test_a_break_away_is_looked_for_where_coulomb_s_friction_leaves_a_little(
     assert LEFT < math.sqrt(mean_square(coulomb, evidence)) < AT_NOISE
     begins = fit_balances(trial(sheet, ("stribeck_friction",)), evidence, searched.floor)
     fuller = fit_free_run(begins, evidence)
-    monkeypatch.setattr(search_module, "begun", lambda *_: fuller)
-    monkeypatch.setattr(search_module, "with_less_friction", lambda *_: [coulomb, fuller])
-    _, found = searched._by_beginning([coulomb], Tried(coulomb, 0.0))
+    monkeypatch.setattr(friction_told, "begun", lambda *_: fuller)
+    monkeypatch.setattr(friction_told, "with_less_friction", lambda *_: [coulomb, fuller])
+    _, found = searched._friction.told([coulomb], Tried(coulomb, 0.0))
     assert found.trial.effects == ("stribeck_friction",)
     assert math.sqrt(mean_square(found.trial, evidence)) < LEFT
 
@@ -401,8 +400,8 @@ def test_what_sticks_beside_another_first_effect_is_told_by_a_beginning(
     members = start.unknowns.members
     told = start.at(np.array([u.at(HIDDEN[u.path]) if u.path in HIDDEN else 0 for u in members]))
     coulomb = fit_balances(trial(sheet, ("coulomb_friction",)), evidence, searched.floor)
-    monkeypatch.setattr(searched, "_with_friction", lambda *_: told)
-    assert searched._sufficient([Tried(coulomb, 0.0, 0.0)]) == [told]
+    monkeypatch.setattr(searched._friction, "_with_friction", lambda *_: told)
+    assert searched._forward._sufficient([Tried(coulomb, 0.0, 0.0)]) == [told]
 
 
 def test_coulomb_s_friction_is_one_with_a_break_away_of_one() -> None:

@@ -26,6 +26,7 @@ from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled, compiled_in_place
 from emir_plant.unnamed import force as unnamed_force
+from emir_plant.unnamed import load as unnamed_load
 
 Array = NDArray[np.float64]
 
@@ -225,11 +226,12 @@ def _write_boom(x: Array, motion: Motion, dry: float, p: Any, dx: Array) -> None
     friction = dry + viscous_friction.friction(motion.joint_velocity, p)
     unnamed = unnamed_force.along(motion.joint_velocity, motion.stroke, p)
     load = external_load.force(x[TIME], p)
+    any_load = unnamed_load.course(x[TIME], p)
     beside = unnamed + external_load.on_piston(load, p)
     torque = (motion.force + beside - friction) * motion.arm
-    torque += external_load.about_joint(load, p)
+    torque += external_load.about_joint(load, p) + unnamed_load.about_joint(any_load, p)
     gravity = cosine(motion.angle)
-    across = external_load.at_tip(load, motion.angle, p)
+    across = external_load.at_tip(load, motion.angle, p) + unnamed_load.at_tip(any_load, p)
     for i in range(n):
         dx[MODES + i] = x[MODES + n + i]
         dx[MODES + n + i] = (
@@ -255,7 +257,8 @@ def truth_of(x: Array, p: Any) -> Truth:
     bending = 0.0
     for i in range(p.mode_deflection.size):
         bending += p.mode_deflection[i] * x[MODES + i]
-    load = external_load.at_tip(external_load.force(x[TIME], p), motion.angle, p)
+    across = external_load.at_tip(external_load.force(x[TIME], p), motion.angle, p)
+    across += unnamed_load.at_tip(unnamed_load.course(x[TIME], p), p)
     return Truth(
         motion.angle,
         motion.tip_angle,
@@ -268,5 +271,5 @@ def truth_of(x: Array, p: Any) -> Truth:
         flow_lowering,
         x[SPOOL],
         x[LOGIC],
-        bending + p.residual_sag * cosine(motion.angle) + p.residual_compliance * load,
+        bending + p.residual_sag * cosine(motion.angle) + p.residual_compliance * across,
     )

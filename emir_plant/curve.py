@@ -19,22 +19,22 @@ class Place(NamedTuple):
 
 
 @compiled
-def place(signal: float, first: float, last: float) -> Place:
+def place(signal: float, first: float, last: float, points: int = POINTS) -> Place:
     """Return where a signal is on a curve that goes straight on beyond its ends."""
-    position = (signal - first) / (last - first) * (POINTS - 1)
-    point = int(min(max(position, 0.0), POINTS - 2.0))
+    position = (signal - first) / (last - first) * (points - 1)
+    point = int(min(max(position, 0.0), points - 2.0))
     return Place(point, position - point)
 
 
 @compiled
-def place_within(signal: float, first: float, last: float) -> Place:
+def place_within(signal: float, first: float, last: float, points: int = POINTS) -> Place:
     """Return where a signal is on a curve that stays beyond its ends as it is there."""
-    return place(min(max(signal, first), last), first, last)
+    return place(min(max(signal, first), last), first, last, points)
 
 
 @compiled
 def value(points: Any, at: Place) -> float:
-    """Return the cubic between two of the points, (POINTS,), with the slopes of chords.
+    """Return the cubic between two of the points, (p,), with the slopes of chords.
 
     At a point that of its neighbours' chord (Catmull and Rom 1974), at the ends of the last one.
     """
@@ -44,7 +44,7 @@ def value(points: Any, at: Place) -> float:
     if t < 0.0 or t > 1.0:
         return straight
     before = points[k - 1] if k > 0 else 2.0 * here - there
-    behind = points[k + 2] if k < POINTS - 2 else 2.0 * there - here
+    behind = points[k + 2] if k < len(points) - 2 else 2.0 * there - here
     start, end = 0.5 * (there - before), 0.5 * (behind - here)
     bent = (1.0 - t) * (start - there + here) - t * (end - there + here)
     result: float = straight + t * (1.0 - t) * bent

@@ -15,6 +15,7 @@ from emir_plant.unnamed import (
     UnnamedCompliance,
     UnnamedForce,
     UnnamedLeakage,
+    UnnamedLoad,
     UnnamedOpening,
 )
 
@@ -157,6 +158,7 @@ class Machine:
     unnamed_opening: UnnamedOpening = UnnamedOpening()
     unnamed_leakage: UnnamedLeakage = UnnamedLeakage()
     unnamed_compliance: UnnamedCompliance = UnnamedCompliance()
+    unnamed_load: UnnamedLoad = UnnamedLoad()
     effects: Effects = field(default_factory=Effects)
 
     @property

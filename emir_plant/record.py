@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from emir_common.quantity import quantities
 from emir_plant.boom import BoomModes, boom_modes
-from emir_plant.curve import POINTS
 from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine
 from emir_plant.unnamed import UNNAMED
 
 _UNNAMED = {f"{g}_{n}": q for g, kind in UNNAMED.items() for n, q in quantities(kind).items()}
-CURVES = tuple(name for name, about in _UNNAMED.items() if about.count)
+CURVES = {name: about.count for name, about in _UNNAMED.items() if about.count}
 EFFECT_FIELDS = (
     *(f"{effect}_{name}" for effect, kind in REGISTRY.items() for name in quantities(kind)),
     *(name for name, about in _UNNAMED.items() if not about.count),
@@ -63,7 +62,7 @@ def record(machine: Machine) -> NDArray[Any]:
 @cache
 def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
     """Return the record's layout: modal quantities are arrays over the modes, curves lists."""
-    shapes = dict.fromkeys(CURVES, (POINTS,))
+    shapes = {name: (count,) for name, count in CURVES.items()}
     return np.dtype(
         [(n, np.float64, (modes,) if n.startswith("mode_") else shapes.get(n, ())) for n in names]
     )

@@ -13,6 +13,7 @@ from emir_plant.effects import backlash, external_load, linkage_error
 from emir_plant.hydraulics import logic_block
 from emir_plant.jit import compiled
 from emir_plant.unnamed import force as unnamed_force
+from emir_plant.unnamed import load as unnamed_load
 
 
 class Acting(NamedTuple):
@@ -33,13 +34,13 @@ def acting(angle: float, parameters: NDArray[Any]) -> Acting:
     """Return what acts at a boom angle, rad, at t = 0. parameters: (1,) the machine's record."""
     p = parameters[0]
     lowest, highest = linkage.reach(p)
-    load = external_load.force(0.0, p)
+    load, any_load = external_load.force(0.0, p), unnamed_load.course(0.0, p)
     stroke = linkage_error.stroke(angle, p)
     return Acting(
         lowest,
         highest,
-        external_load.at_tip(load, angle, p),
-        external_load.about_joint(load, p),
+        external_load.at_tip(load, angle, p) + unnamed_load.at_tip(any_load, p),
+        external_load.about_joint(load, p) + unnamed_load.about_joint(any_load, p),
         external_load.on_piston(load, p),
         unnamed_force.along(0.0, stroke, p),
         stroke,

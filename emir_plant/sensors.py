@@ -122,10 +122,9 @@ def readings(plant: Plant, truth: Array, period: float) -> Readings:
     lifting, lowering = shown["pressure_lifting"], shown["pressure_lowering"]
     if not machine.sensors.own_stroke:
         shown["stroke"] = linkage.strokes(shown["angle"], plant.record[0])
-    return Readings(
-        force=lifting * cylinder.area_lifting - lowering * cylinder.area_lowering,
-        **shown,
-    )
+    with np.errstate(invalid="ignore"):  # a run out of all bounds
+        force = lifting * cylinder.area_lifting - lowering * cylinder.area_lowering
+    return Readings(force=force, **shown)
 
 
 def _distorted(true: Any, name: str, machine: Machine) -> Any:

@@ -30,7 +30,6 @@ from emir_analysis.diagnosis.experiment import (
 from emir_analysis.diagnosis.free_run import ANGLE_COLUMN, STROKE_COLUMN, free_runs
 from emir_analysis.diagnosis.measured_state import Modelled, follow
 from emir_analysis.diagnosis.noise_colour import coloured, colours
-from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant import linkage
 from emir_plant.effects import Effects, terms
@@ -369,8 +368,8 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
     Found by simulating the machine under the recorded command, reading it through the sensors'
     noise and quantisation, and computing its balances with its own parameters. Of a short
     recording several times: a few windows are uncertain, and how much the resolver's steps make
-    depends on where in a step the boom rests. Raises InputError where the machine cannot rest as
-    the recording starts.
+    depends on where in a step the boom rests. Raises SimulationError where the machine cannot rest
+    as the recording starts, or its run leaves every bound.
     """
     angle, pressure = experiment.start()
     pressure = machine.supply.pT if np.isnan(pressure) else pressure
@@ -379,10 +378,9 @@ def noise_floor(experiment: Experiment, machine: Machine, geometry: Machine) -> 
     inside = step * ((np.arange(draws) + 0.5) / draws - 0.5)
     ideal = free_runs([machine] * draws, experiment, [(angle + off, pressure) for off in inside])
     if not np.all(np.isfinite(ideal)):
-        raise InputError(
+        raise SimulationError(
             f"{experiment.name}: the data sheet's machine cannot rest at"
-            f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound;"
-            " check the data sheet, and sign and zero of joint_angle"
+            f" {math.degrees(angle):.1f} deg, where it starts, or its run leaves every bound"
         )
     colour = colours(experiment, machine)
     seen = [sensed(experiment, machine, run, seed, colour) for seed, run in enumerate(ideal)]

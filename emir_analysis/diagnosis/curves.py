@@ -8,9 +8,8 @@ from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.signals import Array
 from emir_common.quantity import quantities
-from emir_plant.curve import POINTS
 from emir_plant.parameters import Machine
-from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
+from emir_plant.unnamed import UNNAMED, compliance, force, leakage, load, opening
 
 STROKE, H, S = range(3)  # columns of an experiment's outputs
 DIFFERENCE = "pressure_difference"
@@ -29,6 +28,7 @@ CURVE_PARTS = {  # the lists, in words
     "lifting": "of the lifting chamber",
     "lowering": "of the lowering chamber",
     "across": "across the piston",
+    "course": "as at the TCP",
 }
 
 
@@ -60,11 +60,13 @@ KINDS = (
     Kind("unnamed_leakage", DIFFERENCE, "Pa", leakage.DIFFERENCE, (("across",),)),
     Kind("unnamed_compliance", OWN, "Pa", compliance.PRESSURE, EITHER_OR_BOTH),
 )
+BY_TIME = "time"
+COURSE = Kind("unnamed_load", BY_TIME, "s", load.TIME, (("course",),))
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What has no name, over a signal, (p,).
+    """What has no name, over a signal, (p,), or a load's course over time.
 
     name: of the machine's parameter group. unit: of the signal. parts: the group's lists that are
     not zero, (p,) each, NaN at places beyond what was recorded, part_unit: theirs.
@@ -80,12 +82,13 @@ class Curve:
 
 def curve(machine: Machine) -> Curve | None:
     """Return the curve that a machine has, if it has one."""
-    for kind in KINDS:
+    for kind in (*KINDS, COURSE):
         group = getattr(machine, kind.group)
         if group.over == kind.code:
             units = {name: about.unit for name, about in quantities(group).items() if about.count}
             parts = {name: getattr(group, name) for name in units if any(getattr(group, name))}
-            signal = tuple(map(float, np.linspace(group.first, group.last, POINTS)))
+            points = next(about.count for about in quantities(group).values() if about.count)
+            signal = tuple(map(float, np.linspace(group.first, group.last, points)))
             part_unit = next(iter(units.values()))
             return Curve(kind.group, kind.over, kind.unit, signal, part_unit, parts)
     return None
@@ -124,6 +127,8 @@ def visited(over: str, evidence: Evidence) -> Array:
 
     Of the opening the command tells, which is a little more.
     """
+    if over == BY_TIME:
+        return np.concatenate([e.time for e in evidence.experiments])
     if over == BY_VELOCITY:
         return evidence.velocity
     if over == "valve_opening":

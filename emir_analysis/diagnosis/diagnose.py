@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, with_spread
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.load_course import has_course
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.search import Search
@@ -51,9 +52,10 @@ class Findings:
     which on a balance speaks. speaking: the balance that no effect takes down to the noise, the
     loudest or that which swings with time, shape: of its residual, swing: how that swings, where:
     most of it lies. misstated: parameters with one value of the sheet replaced, their last unknown,
-    where that explains what no effect does, the best first; curve: what has no name. With either
-    `chosen` and `after` then are. drift: of a size, where that makes most of what is left.
-    stopped: s, after which the search was over before its end, None where it was not.
+    where that explains what no effect does, the best first; curve: what has no name, with either of
+    which `chosen` and `after` then are, or a load's course over time. drift: of a size, where that
+    makes most of what is left. stopped: s, after which the search was over before its end, None
+    where it was not.
     """
 
     evidence: Evidence
@@ -111,7 +113,8 @@ def diagnose(
     best = search.run()
     before, unaided = evidence.residuals([sheet.machine, search.balanced.machine])
     named, after = _named(best[0], unaided, search, evidence)
-    verdict = _verdict(named, after, evidence, rivals=len(best) - 1)
+    rivals = [] if has_course(named) else best[1:]
+    verdict = _verdict(named, after, evidence, rivals=len(rivals))
     curves = Curves(search.balanced, evidence, search.floor)
     doubts = _doubts(named, verdict, curves, search, evidence, progress)
     if doubts.any:
@@ -138,8 +141,8 @@ def diagnose(
         chosen=final,
         rejected=named if verdict == "unexplained" and named.effects else None,
         tried=tuple(search.tried),
-        rivals=tuple(best[1:]),
-        undecided=open_shares(final, evidence),
+        rivals=tuple(rivals),
+        undecided={} if has_course(final) else open_shares(final, evidence),
         residuals={"before": before, "refitted": unaided, "after": after},
         floor=floor,
         limit=limit,
@@ -148,7 +151,7 @@ def diagnose(
         swing=swings,
         where=lies,
         misstated=doubts.misstated,
-        curve=None if instead is None or doubts.misstated else _curve(final, evidence),
+        curve=None if doubts.misstated else _curve(final, evidence),
         drift=search.drifting if asked else None,
         stopped=evidence.limit.seconds if evidence.limit.is_over else None,
     )
@@ -165,6 +168,8 @@ def _named(best: Trial, unaided: Array, search: Search, evidence: Evidence) -> t
 
     That is (w, 5). Parameters alone where there are no effects, with which they lack `unaided`.
     """
+    if search.loaded is not None:
+        return search.loaded, evidence.residuals([search.loaded.machine])[0]
     if not best.effects:
         return search.refitted, unaided
     named = search.named(best)
@@ -177,7 +182,8 @@ def _settled(named: Trial, verdict: str, search: Search, evidence: Evidence) -> 
     if verdict == "unexplained":
         return search.refitted
     final = search.whole.fitted(named) if verdict == "nothing_missing" else named
-    return final if sticks(final) else with_spread(final, evidence)  # whose free run is rough
+    rough = sticks(final)  # in the free run
+    return final if rough or has_course(final) else with_spread(final, evidence)
 
 
 class _Doubts(NamedTuple):
@@ -212,7 +218,7 @@ def _doubts(  # noqa: PLR0913, PLR0917 (what is asked, of what)
     replaced = _misstated(named, "unexplained" if is_spring else verdict, search, evidence)
     if replaced or is_spring:
         return _Doubts(any=True, misstated=tuple(replaced))
-    if verdict != "found" or excess(named, evidence) <= beyond(LEFT):
+    if verdict != "found" or has_course(named) or excess(named, evidence) <= beyond(LEFT):
         return _Doubts()
     if _drifts(named, search):
         return _Doubts(any=True)

@@ -17,6 +17,7 @@ from emir_analysis.diagnosis.time_limit import TimeLimit
 from emir_analysis.errors import InputError
 from emir_analysis.signals import Array
 from emir_plant.parameters import Machine
+from emir_plant.plant import SimulationError
 
 
 class Evidence:
@@ -126,6 +127,8 @@ class Evidence:
         """Return the level, (5,), that the sensors of a machine alone leave in each balance.
 
         NaN where it is not told. The linkage balance is exact: there it is the stroke's own noise.
+        Of a machine whose run leaves every bound the stated one's. Raises InputError where that
+        does, too.
         """
         left = np.concatenate([np.concatenate(draws) for draws in _drawn(self, machine)])
         floor = np.where(self.told, level(left), np.nan)
@@ -143,4 +146,10 @@ class Evidence:
 
 @lru_cache(maxsize=8)  # floor and drawn levels are asked for of one machine, and some once more
 def _drawn(evidence: Evidence, machine: Machine) -> list[Array]:
-    return [noise_floor(e, machine, evidence.stated) for e in evidence.experiments]
+    try:
+        return [noise_floor(e, machine, evidence.stated) for e in evidence.experiments]
+    except SimulationError as error:
+        if machine == evidence.stated:
+            advice = "check the data sheet, and sign and zero of joint_angle"
+            raise InputError(f"{error}; {advice}") from error
+        return _drawn(evidence, evidence.stated)

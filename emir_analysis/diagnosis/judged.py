@@ -12,6 +12,7 @@ from emir_analysis.diagnosis.experiment import OUTPUTS, Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run
 from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
+from emir_analysis.diagnosis.load_course import elsewhere, has_course
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.run_errors import free_run, free_run_errors
 from emir_analysis.diagnosis.select import EXPLAINED, HELPS, HOPELESS, at_noise, leaves_quiet
@@ -56,28 +57,37 @@ class Judged:
         return rms(errors[:, self.evidence.shown])
 
 
-def machines(findings: Findings) -> dict[str, Machine]:
+def machines(findings: Findings, judge: Evidence) -> dict[str, Machine]:
     """Return the machine of each stage; without an effect named, the last is the re-fitted one."""
-    found = (findings.sheet.machine, findings.refitted.machine, findings.chosen.machine)
+    found = (findings.sheet.machine, findings.refitted.machine, there(findings, judge).machine)
     return dict(zip(STAGES, found, strict=True))
+
+
+def there(findings: Findings, judge: Evidence) -> Trial:
+    """Return what was found as it is in judge recordings: loads of any course are others there."""
+    same = judge.name == findings.evidence.name
+    return findings.chosen if same else elsewhere(findings.chosen)
 
 
 def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     """Run every model, its parameters as they are, on recordings to be judged on."""
     evidence = Evidence(experiments, findings.sheet.machine)
     evidence.check_like(findings.evidence)
+    stages = machines(findings, evidence)
     runs = {
         stage: [free_run(machine, e, evidence) for e in evidence.experiments]
-        for stage, machine in machines(findings).items()
+        for stage, machine in stages.items()
     }
-    one_step = {stage: evidence.one_step(machine) for stage, machine in machines(findings).items()}
+    one_step = {stage: evidence.one_step(machine) for stage, machine in stages.items()}
     free = black_box.train(findings.evidence)
     ahead = black_box.train_one_step(findings.evidence)
     runs[BLACK_BOX] = [_spread(free.free_run(e), evidence) for e in evidence.experiments]
     one_step[BLACK_BOX] = [_spread(ahead.one_step(e), evidence) for e in evidence.experiments]
-    alone = loudest_signal(findings.chosen.machine, evidence)[1]
-    surprising = not explained(findings.chosen, evidence) or alone > EXPLAINED
-    asked = findings.verdict in {"nothing_missing", "found"} and not sticks(findings.chosen)
+    chosen = there(findings, evidence)
+    alone = loudest_signal(chosen.machine, evidence)[1]
+    surprising = not explained(chosen, evidence) or alone > EXPLAINED
+    asked = findings.verdict in {"nothing_missing", "found"} and not sticks(chosen)
+    asked = asked and not has_course(findings.chosen)
     reconciled = asked and surprising and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
 

@@ -15,6 +15,7 @@ from emir_analysis.diagnosis.judged import (
     carries,
     loudest_signal,
 )
+from emir_analysis.diagnosis.load_course import has_course
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.select import EXPLAINED
 
@@ -26,6 +27,8 @@ PLACES = 3  # of the outputs: stroke and pressures, where a machine was
 
 def judgement(findings: Findings, judged: Judged) -> str:
     """Return what the judge recordings say of a verdict, to follow it; empty where they agree."""
+    if findings.verdict == "found" and has_course(findings.chosen):
+        return _elsewhere_loaded(judged) if judged.surprising else ""
     if findings.curve is not None:
         return _measured(findings.curve, findings, judged)
     if findings.misstated:
@@ -49,6 +52,12 @@ def judgement(findings: Findings, judged: Judged) -> str:
         advice = "see whether it is of the same machine, then " + advice
     left = _off(findings, judged) + _no_better(findings, judged)
     return f"; but {judge}, {left}, {more}: {advice}"
+
+
+def _elsewhere_loaded(judged: Judged) -> str:
+    """Return how far off recordings are whose load from outside nobody knows."""
+    off, judge = judged.off(STAGES[-1]), judged.evidence.name
+    return f"; {judge}, whose load nobody knows, is {off:.1f} times the noise off without one"
 
 
 def _no_better(findings: Findings, judged: Judged) -> str:

@@ -1,12 +1,13 @@
 """The report of a diagnosis as a page that is read in two minutes."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from emir_analysis.diagnosis.balances import level
 from emir_analysis.diagnosis.candidates import CandidateResult
-from emir_analysis.diagnosis.curves import CURVE_PARTS, Curve
+from emir_analysis.diagnosis.curves import BY_TIME, CURVE_PARTS, Curve
 from emir_analysis.diagnosis.diagnose import Findings
 from emir_analysis.diagnosis.drift import Drift
 from emir_analysis.diagnosis.error_tests import ErrorTests
@@ -37,6 +38,7 @@ VERDICTS = {
     "ambiguous": "More than one effect would do",
     "unexplained": "Something is there that no known effect explains",
 }
+MOST_ROWS = 40  # points of a curve whose every second is in its table
 
 
 def write_page(path: Path, findings: Findings, result: Diagnosis, judged: Judged) -> None:
@@ -214,13 +216,15 @@ def _drift(drift: Drift) -> list[Block]:
 
 
 def _curve(curve: Curve) -> list[Block]:
-    """Return a picture of what has no name, and a table of every second of its points."""
-    rows = list(zip(curve.signal, *curve.parts.values(), strict=True))[::2]
+    """Return a picture of what has no name, or of a load over time, and a table of its points."""
+    every = 2 * math.ceil(len(curve.signal) / MOST_ROWS)
+    rows = list(zip(curve.signal, *curve.parts.values(), strict=True))[::every]
+    what = "What has no name" if curve.over != BY_TIME else "The load from outside"
     heads = [f"{CURVE_PARTS[name]}, {curve.part_unit}" for name in curve.parts]
     return [
         Picture(
             curve_picture(curve),
-            f"What has no name, as a curve in the machine ({curve.name}), fitted to the free run.",
+            f"{what}, as a curve in the machine ({curve.name}), fitted to the free run.",
         ),
         Table((f"{curve.over}, {curve.unit}", *heads), rows, "The same in numbers."),
     ]

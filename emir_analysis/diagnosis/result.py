@@ -21,6 +21,8 @@ from emir_analysis.diagnosis.experiment import OUTPUTS
 from emir_analysis.diagnosis.free_run import block_medians
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import BLACK_BOX, STAGES, Judged
+from emir_analysis.diagnosis.load_course import SHARE, has_course, sizes
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.shape import Shape
 from emir_analysis.diagnosis.statement import at_end, statement, tell_apart, verdict
 from emir_analysis.diagnosis.statistics import BOOTSTRAP_BLOCK, PERIODS
@@ -274,6 +276,9 @@ def effect_results(
     found = []
     for name in chosen.effects:
         kind = REGISTRY[name]
+        if name == LOAD and has_course(chosen):
+            found.append(EffectResult(name, kind.balance, _of_course(chosen, fitted)))
+            continue
         effect = getattr(chosen.machine.effects, name)
         usual = quantities(kind).keys() - {*kind.sizes, *kind.other_law}
         parameters = {}
@@ -295,6 +300,15 @@ def effect_results(
                 )
         found.append(EffectResult(name, kind.balance, parameters))
     return tuple(found)
+
+
+def _of_course(chosen: Trial, fitted: dict[str, ParameterResult]) -> dict[str, ParameterResult]:
+    """Return what there is to say of a load of any course in a few numbers."""
+    told = {}
+    for name, (value, spread, meaning) in sizes(chosen).items():
+        low, high = value - INTERVAL * spread, value + INTERVAL * spread
+        told[name] = ParameterResult(value, "N", low, high, (), meaning)
+    return told | {"joint_share": replace(fitted[SHARE], meaning="of it, a torque about the joint")}
 
 
 def _balances(findings: Findings) -> dict[str, BalanceResult]:

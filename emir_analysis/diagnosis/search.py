@@ -1,5 +1,6 @@
 """Which effects explain the recordings: what is tried, in which order, and what is kept."""
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,8 @@ from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.forward_selection import MOST_EFFECTS, ForwardSelection
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.friction_told import FrictionTold
+from emir_analysis.diagnosis.load_course import load_course
+from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import Misstated
 from emir_analysis.diagnosis.rounds import Rounds
 from emir_analysis.diagnosis.run_errors import free_run_errors
@@ -48,6 +51,7 @@ class Search:
 
     balanced, refitted: the parameters alone, fitted to the balances and to the whole free run.
     misstated: what one value of the sheet explains, if it is another. elimination: of effects.
+    loaded: with a load of any course, where that explains what no effect does, once that was asked.
     """
 
     def __init__(self, evidence: Evidence, sheet: Sheet, progress: Progress) -> None:
@@ -73,6 +77,8 @@ class Search:
             progress,
         )
         self.elimination = BackwardElimination(evidence, sheet, self.whole, progress)
+        self.loaded: Trial | None = None
+        self._courses: dict[tuple[str, ...], Trial | None] = {}  # of loads, by effects beside
 
     @property
     def tried(self) -> list[Tried]:
@@ -122,9 +128,13 @@ class Search:
         if not enough and sticks(best.trial):  # however far off: where it sticks drives it away
             equal, best = self._friction.told(equal, best, LEFT)
             enough = is_enough(best.trial, self._evidence)
+        if not enough and self._is_load(best.trial):
+            return [best.trial]
         if enough or not (self.misstated.better_than(best.trial) or self.drifting):
             if not enough:
                 equal = self._forward.two_at_once(plain, best) or equal
+                if equal[0].effects != best.trial.effects and self._is_load(equal[0]):
+                    return equal
             equal = self._with_others_in_place(self.nearest_the_whole(equal))
             equal = self.nearest_the_whole(equal)
         self.elimination.settled = self._friction.settled
@@ -151,6 +161,31 @@ class Search:
         """Tell whether the free run of each signal is at the noise; it is not where it is none."""
         errors = free_run_errors(one.machine, self._evidence)
         return bool(np.all(column_rms(np.concatenate(errors)) <= AT_NOISE))
+
+    def _is_load(self, best: Trial) -> bool:
+        """Tell whether a load of any course explains all: alone, or beside effects that came near.
+
+        Beside these where alone it leaves something, since it may stand for any force. A size that
+        drifts is no load.
+        """
+        if self.drifting or is_enough(self.whole.better(best), self._evidence):
+            return False
+        alone = self._with_load(self.balanced)
+        self.loaded = alone
+        if alone is None or self._excess(alone) > beyond(LEFT):
+            others = best.without(LOAD) if LOAD in best.effects else best
+            beside = self._with_load(fit_balances(others, self._evidence, self.floor))
+            limit = math.inf if alone is None else self.whole.score(alone) - STRONG
+            if beside is not None and self.whole.score(beside) < limit:
+                self.loaded = beside
+        return self.loaded is not None
+
+    def _with_load(self, known: Trial) -> Trial | None:
+        """Return a trial with a load of any course beside its effects, asked for once."""
+        if known.effects not in self._courses:
+            found = load_course(known, self._evidence, self.floor, self._progress)
+            self._courses[known.effects] = found
+        return self._courses[known.effects]
 
     def _with_others_in_place(self, equal: list[Trial]) -> list[Trial]:
         """Return the best trials with other effects in place of some of several, where better.

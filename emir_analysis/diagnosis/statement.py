@@ -12,6 +12,7 @@ from emir_analysis.diagnosis.foresight import parting
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import Judged, carries
 from emir_analysis.diagnosis.judgement import judgement
+from emir_analysis.diagnosis.load_course import has_course
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.moments import Moments, moments
 from emir_analysis.diagnosis.mounting import spring_in_series
@@ -81,6 +82,8 @@ def _of_findings(findings: Findings) -> str:
         names += ", which this recording cannot tell apart"
     left = f"; {left_over}" if left_over else ""
     more = other_reasons(findings.chosen) + _undecided(findings) + _unforeseeable(findings)
+    if has_course(findings.chosen):
+        more = _of_course(findings.chosen) + more
     return names + left + more
 
 
@@ -111,6 +114,15 @@ def other_reasons(chosen: Trial) -> str:
     if late.min() > CLOCK and np.ptp(late) < ALIKE * late.max():
         return "; both pressures come equally late, as by another clock"
     return ""
+
+
+def _of_course(chosen: Trial) -> str:
+    """Return what is known of a load of any course."""
+    course = chosen.machine.unnamed_load.course
+    return (
+        f"; a load that follows no formula, {min(course):.3g} to {max(course):.3g} N as at the TCP,"
+        " and that nothing in the machine foretells, as wind or pushes"
+    )
 
 
 def _undecided(findings: Findings) -> str:

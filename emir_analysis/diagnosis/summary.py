@@ -2,6 +2,7 @@
 
 import math
 
+from emir_analysis.diagnosis.curves import BY_TIME
 from emir_analysis.diagnosis.result import (
     BalanceResult,
     Diagnosis,
@@ -104,6 +105,11 @@ def in_short(result: Diagnosis) -> str:
     errors = f"Largest free-run error of a signal on {result.judged_on}, times its noise"
     if result.effects:
         errors += f": {came} by the data sheet, {refitted} with its parameters fitted, {after} with"
+        if result.curve is not None and result.curve.over == BY_TIME:
+            return (
+                f"{errors} what was found, but for the load: that one is of {result.recording}"
+                " alone. --model-out writes the machine with it, emir run --params simulates that."
+            )
         if worst["with_effect"] > EXPLAINED:
             return (
                 f"{errors} what was found. That recording shows more: diagnose both together before"

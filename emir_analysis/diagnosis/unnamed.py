@@ -44,7 +44,6 @@ from emir_plant.unnamed import UNNAMED
 MEASURED_SHARE = 0.5  # of the balances' squares above the noise, from which on it is measured
 BENT = 0.1  # standard deviation of a curve's second differences, in units of its size
 LARGEST_SIZE = 10.0  # times its size: a curve goes no further
-BENDING: Array = np.diff(np.eye(POINTS), 2, axis=0) / BENT  # (p - 2, p), of a curve over its size
 SMOOTHING = "smoothing_speed"
 FRICTION = "_friction"  # how all of it is called
 
@@ -82,7 +81,7 @@ class Curves:
         best = balances.best(self._forms)
         if best is None or best.share < MEASURED_SHARE:
             return None
-        found = _fitted(best.trial, self._evidence)
+        found = fitted_smoothly(best.trial, self._evidence)
         if not excess(found, self._evidence) <= beyond(EXPLAINED):  # NaN of a run out of bounds
             return None
         left = level(self._evidence.residuals([found.machine])[0])
@@ -117,23 +116,29 @@ class Curves:
         best = self._balances.best(self._forms)
         if best is None:
             return None
-        found = _fitted(best.trial, self._evidence)
+        found = fitted_smoothly(best.trial, self._evidence)
         limit = free_run_score(named, self._evidence, seen=0.0) - STRONG
         return found if free_run_score(found, self._evidence, seen=0.0) < limit else None
 
 
-def _fitted(start: Trial, evidence: Evidence) -> Trial:
-    """Return a trial fitted to the free run of the recordings, first of their beginning.
+def bending(points: int, bent: float = BENT) -> Array:
+    """Return the second differences, (p - 2, p), of a curve over its size, in units of `bent`."""
+    return np.asarray(np.diff(np.eye(points), 2, axis=0) / bent)
+
+
+def fitted_smoothly(start: Trial, evidence: Evidence, bent: float = BENT) -> Trial:
+    """Return a trial with curves fitted to the free run of recordings, first of their beginning.
 
     That is left out where the balances' curve explains the whole. What the free run tells less
     than they do stays as they say. A curve that leaves more in a part than the whole may have left
-    stays as fitted to that, and one that is hopeless after a few steps is not polished.
+    stays as fitted to that, and one that is hopeless after a few steps is not polished. bent: what
+    is expected of the curves, as for `bending`.
     """
     begin = np.append(start.x, np.zeros(2 * len(evidence.experiments)))
     x, trial = begin, start
     near = excess(start, evidence) <= beyond(EXPLAINED)
     for share in (1.0,) if near else (*GROWING, 1.0):
-        problem = _smoothly(free_run_problem(trial, evidence, x, share), trial, begin)
+        problem = _smoothly(free_run_problem(trial, evidence, x, share), trial, begin, bent)
         solution = fit(problem, FREE_RUN_ACCURACY, evaluations=GLIMPSE)
         if solution.misfit <= HOPELESS:
             solution = fit(replace(problem, start=solution.x), FREE_RUN_ACCURACY)
@@ -143,15 +148,16 @@ def _fitted(start: Trial, evidence: Evidence) -> Trial:
     return trial
 
 
-def _smoothly(problem: Problem, trial: Trial, begin: Array) -> Problem:
+def _smoothly(problem: Problem, trial: Trial, begin: Array, bent: float) -> Problem:
     """Return a problem in which second differences of the curves' changes are errors, too.
 
     begin: (k,) from where they change.
     """
-    lists = [u.path.rpartition(".")[0] for u in trial.unknowns.members]
-    each = [np.flatnonzero(np.array(lists) == name) for name in dict.fromkeys(lists)]
+    lists = [u.path.rpartition(".")[0] for u in trial.unknowns.members if is_point(u.path)]
+    paths = np.array([u.path.rpartition(".")[0] for u in trial.unknowns.members])
+    each = [np.flatnonzero(paths == name) for name in dict.fromkeys(lists)]
     unit = np.eye(begin.size)
-    rows = np.vstack([BENDING @ unit[k] for k in each if k.size == POINTS])
+    rows = np.vstack([bending(k.size, bent) @ unit[k] for k in each])
 
     def smooth(model: Callable[[Array], Array]) -> Callable[[Array], Array]:
         return lambda points: np.hstack([model(points), (points - begin) @ rows.T])
@@ -265,30 +271,35 @@ class _Balances:
         """Return the trial whose curves' second differences are small beside their size."""
         known = self._known
         count = len(form.points) // POINTS
-        bending = np.asarray(np.kron(np.eye(count), BENDING), dtype=np.float64)
+        bent = np.asarray(np.kron(np.eye(count), bending(POINTS)), dtype=np.float64)
         machine = with_values(known.machine, form.named)
         everything = Unknowns(machine, (*known.unknowns.members, *form.points))
         points = list(zip(form.points, form.slopes.T, strict=True))
-        expected = np.hstack([np.zeros((len(bending), known.x.size)), bending])
+        expected = np.hstack([np.zeros((len(bent), known.x.size)), bent])
         x, left = self._straight.least(points, expected)
         share = 1.0 - _above_noise(left) / _above_noise(self._straight.left)
-        criterion = self._criterion(left, form.slopes, bending)
+        criterion = self._criterion(left, form.slopes, bent)
         return _Begun(_with_smoothing(everything, x), criterion, share)
 
-    def _criterion(self, left: Array, curves: Array, bending: Array) -> float:
+    def _criterion(self, left: Array, curves: Array, bent: Array) -> float:
         """Return a Bayesian criterion of what is left, (n,), in units of the noise.
 
-        curves: (n, c p) slopes by the points of c curves, bending: their second differences.
+        curves: (n, c p) slopes by the points of c curves, bent: their second differences.
         The points count as the parameters that the balances tell in spite of what is expected of
         the second differences: the trace of the hat matrix.
         """
         told = curves.T @ curves
-        return self._score(left, np.trace(np.linalg.pinv(told + bending.T @ bending) @ told))
+        return self._score(left, np.trace(np.linalg.pinv(told + bent.T @ bent) @ told))
 
     def _score(self, left: Array, count: float) -> float:
         """Return the criterion of what is left, (n,), in units of the noise, by so many numbers."""
         balances = left.reshape(-1, np.count_nonzero(self._evidence.fitted))
         return score(np.maximum(np.mean(balances**2, axis=0), 1.0), self._independent, count)
+
+
+def is_point(path: str) -> bool:
+    """Tell whether a parameter, by dotted path, is a point of a curve."""
+    return path.partition(".")[0] in UNNAMED and path.rpartition(".")[2].isdecimal()
 
 
 def _above_noise(left: Array) -> float:

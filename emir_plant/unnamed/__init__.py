@@ -7,6 +7,7 @@ controlled and looked at; a name it has not. All are off by default.
 from emir_plant.unnamed.compliance import UnnamedCompliance
 from emir_plant.unnamed.force import UnnamedForce
 from emir_plant.unnamed.leakage import UnnamedLeakage
+from emir_plant.unnamed.load import UnnamedLoad
 from emir_plant.unnamed.opening import UnnamedOpening
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "UnnamedCompliance",
     "UnnamedForce",
     "UnnamedLeakage",
+    "UnnamedLoad",
     "UnnamedOpening",
 ]
 
@@ -22,4 +24,5 @@ UNNAMED = {  # groups of a machine's parameters, each on where its `over` is not
     "unnamed_opening": UnnamedOpening,
     "unnamed_leakage": UnnamedLeakage,
     "unnamed_compliance": UnnamedCompliance,
+    "unnamed_load": UnnamedLoad,
 }

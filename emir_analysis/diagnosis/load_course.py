@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.missing import in_balances
-from emir_analysis.diagnosis.select import EXPLAINED, beyond, excess, limits, quiet
+from emir_analysis.diagnosis.select import EXPLAINED, HOPELESS, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import best_shape
 from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial
@@ -46,21 +46,28 @@ def load_course(known: Trial, evidence: Evidence, floor: Array, progress: Progre
     another balance speaks (but the bending, which loads move), the machine's own signals foretell
     what is missing, or where the load does not explain all. floor: (5,) of the balances.
     """
-    if len(evidence.experiments) > 1 or not evidence.told[FORCE]:
-        return None
-    residuals = evidence.residuals([known.machine])[0]
-    left, limit = level(residuals), limits(known.machine, evidence)
-    if not quiet(np.where(OTHERS, left, np.nan), limit) or left[FORCE] <= limit[FORCE]:
-        return None
-    force = residuals[:, FORCE]
-    if foretold(force, evidence) > FORETOLD:
+    if not may_be_loaded(known, evidence):
         return None
     progress(f"a load of any course beside: {known.name}")
-    found = fitted_smoothly(_begun(known, rms(force), evidence, floor), evidence, BENT)
-    if not excess(found, evidence) <= beyond(EXPLAINED):  # NaN of a run out of bounds
+    begun = _begun(known, evidence, floor)
+    if not excess(begun, evidence) <= beyond(HOPELESS):  # NaN of a run out of bounds
+        return None
+    found = fitted_smoothly(begun, evidence, BENT)
+    if not excess(found, evidence) <= beyond(EXPLAINED):
         return None
     left = level(evidence.residuals([found.machine])[0])
     return found if quiet(left, limits(found.machine, evidence)) else None
+
+
+def may_be_loaded(known: Trial, evidence: Evidence) -> bool:
+    """Tell whether a force alone is missing, in one recording, that no signal foretells."""
+    if len(evidence.experiments) > 1 or not evidence.told[FORCE]:
+        return False
+    residuals = evidence.residuals([known.machine])[0]
+    left, limit = level(residuals), limits(known.machine, evidence)
+    if not quiet(np.where(OTHERS, left, np.nan), limit) or left[FORCE] <= limit[FORCE]:
+        return False
+    return foretold(residuals[:, FORCE], evidence) <= FORETOLD
 
 
 def has_course(known: Trial) -> bool:
@@ -120,8 +127,9 @@ def _together(missing: Array, signals: Array) -> float:
     return 1.0 - float(np.mean((missing - foretold) ** 2) / np.var(missing))
 
 
-def _begun(known: Trial, force: float, evidence: Evidence, floor: Array) -> Trial:
-    """Return a trial with a load as the balances have it. force: N, how much of it is missing."""
+def _begun(known: Trial, evidence: Evidence, floor: Array) -> Trial:
+    """Return a trial with a load as the balances have it."""
+    force = rms(evidence.residuals([known.machine])[0][:, FORCE])
     straight = Straight(known, in_balances(evidence, floor), DIFFERENCE_STEP)
     geometry = known.machine.geometry
     points = _points(force * geometry.triangle_b / geometry.boom_length)

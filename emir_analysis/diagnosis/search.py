@@ -18,7 +18,7 @@ from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.forward_selection import MOST_EFFECTS, ForwardSelection
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.friction_told import FrictionTold
-from emir_analysis.diagnosis.load_course import load_course
+from emir_analysis.diagnosis.load_course import load_course, may_be_loaded
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.misstated import Misstated
 from emir_analysis.diagnosis.rounds import Rounds
@@ -41,6 +41,8 @@ from emir_analysis.diagnosis.tried import Tried, as_good
 from emir_analysis.diagnosis.whole import Progress, Whole
 from emir_analysis.root_mean_square import column_rms
 from emir_plant.sheet import Sheet
+
+MOST_BESIDE_LOAD = 5  # sets of effects beside which a load of any course is looked for
 
 
 class Search:
@@ -170,15 +172,22 @@ class Search:
         """
         if self.drifting or is_enough(self.whole.better(best), self._evidence):
             return False
-        alone = self._with_load(self.balanced)
-        self.loaded = alone
-        if alone is None or self._excess(alone) > beyond(LEFT):
+        self.loaded = self._with_load(self.balanced)
+        if self.loaded is None or self._excess(self.loaded) > beyond(LEFT):
             others = best.without(LOAD) if LOAD in best.effects else best
-            beside = self._with_load(fit_balances(others, self._evidence, self.floor))
-            limit = math.inf if alone is None else self.whole.score(alone) - STRONG
-            if beside is not None and self.whole.score(beside) < limit:
-                self.loaded = beside
+            singles = [t.trial for t in sorted(self.tried, key=lambda t: t.balances)]
+            for known in [others, *(t for t in singles if len(t.effects) == 1)][:MOST_BESIDE_LOAD]:
+                self._look_beside(known)
         return self.loaded is not None
+
+    def _look_beside(self, known: Trial) -> None:
+        """Take a load beside effects where that is clearly better."""
+        if LOAD in known.effects or not may_be_loaded(known, self._evidence):
+            return
+        beside = self._with_load(fit_balances(known, self._evidence, self.floor))
+        limit = math.inf if self.loaded is None else self.whole.score(self.loaded) - STRONG
+        if beside is not None and self.whole.score(beside) < limit:
+            self.loaded = beside
 
     def _with_load(self, known: Trial) -> Trial | None:
         """Return a trial with a load of any course beside its effects, asked for once."""

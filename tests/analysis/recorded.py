@@ -74,6 +74,7 @@ sensors:
 """
 
 Force = Callable[[float, float], float]  # (stroke, m, velocity, m/s) -> N against the motion
+Load = Callable[[float], float]  # (time, s) -> N across the boom at the TCP, up positive
 
 
 def moves(duration: float, seed: int) -> Array:
@@ -106,22 +107,26 @@ def simulate(
     commands: Array,
     friction: Force | None = None,
     period: float = SAMPLE_PERIOD,
+    load: Load | None = None,
 ) -> Array:
     """Return p_H, p_S, angle and tip angle, (n, 4), every period, s, from rest at 45 deg.
 
-    friction is added to the machine's own right-hand side.
+    friction and a load are added to the machine's own right-hand side.
     """
     plant = Plant(machine)
     joint, tip = plant.record[0]["mode_joint"], plant.record[0]["mode_tip_angle"]
+    way = machine.geometry.boom_length * joint + plant.record[0]["mode_deflection"]  # of the TCP
     modes = joint.size
     position = slice(core.MODES, core.MODES + modes)
     rate = slice(core.MODES + modes, core.MODES + 2 * modes)
 
-    def slope(_: float, x: Array, command: float) -> Array:
+    def slope(time: float, x: Array, command: float) -> Array:
         dx = plant.derivative(x, command)
         if friction is not None:
             stroke, arm = cylinder(float(joint @ x[position]), machine.geometry)
             dx[rate] -= joint * arm * friction(stroke, arm * float(joint @ x[rate]))
+        if load is not None:
+            dx[rate] += way * load(time)
         return dx
 
     x = plant.initial(np.pi / 4.0, 25e5)

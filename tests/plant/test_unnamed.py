@@ -15,7 +15,7 @@ from emir_plant.plant import Plant
 from emir_plant.robot.actuators import machines
 from emir_plant.robot.sheet import robot
 from emir_plant.sheet import data, joint1, load_sheet
-from emir_plant.unnamed import UNNAMED, compliance, force, leakage, opening
+from emir_plant.unnamed import UNNAMED, compliance, force, leakage, load, opening
 
 FORTY_FIVE = math.radians(45.0)
 T = {name: k for k, name in enumerate(Truth._fields)}
@@ -188,3 +188,23 @@ def test_the_whole_robot_says_that_it_has_none(
     known = robot(None, file)
     with pytest.raises(ParameterError, match=f"{group}: not in the model of the whole robot"):
         machines(known, ())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_course_that_is_constant_is_a_load_with_a_formula(share: float) -> None:
+    ours = _plant(load.TIME, (0.0, 4.0), "load", course=[2e3] * load.COURSE)
+    ours = Plant(with_values(ours.machine, {"unnamed_load.joint_share": share}))
+    known = _with(external_load__force=2e3, external_load__joint_share=share)
+    assert np.allclose(_run(ours), _run(known), rtol=1e-9, atol=1e-9)
+
+
+def test_a_course_through_points_of_a_swing_is_that_swing() -> None:
+    """Between them a cubic: of a swing of 0.5 Hz, 45 points in a period, 1e-4 of its size."""
+    time = np.linspace(0.0, 8.0, load.COURSE)
+    swing = 2e3 * np.cos(2.0 * np.pi * 0.5 * time)
+    ours = _run(_plant(load.TIME, (0.0, 8.0), "load", course=swing.tolist()))
+    known = _run(_with(external_load__force=2e3, external_load__frequency=0.5))
+    none = _run(Plant(joint1()))
+    for name in ("stroke", "pressure_lifting", "tip_angle"):
+        moved = np.std(known[:, T[name]] - none[:, T[name]])
+        assert np.std(ours[:, T[name]] - known[:, T[name]]) < 1e-3 * moved

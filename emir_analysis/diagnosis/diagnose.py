@@ -35,7 +35,9 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
-LIKE = 1.5  # times the noise: more, of what does not stick, and an effect is only like the truth
+# times the noise: more, and an effect is only like the truth; not of what sticks, or of a load whose
+# course is told by half seconds
+LIKE = 1.5
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 
 
@@ -280,7 +282,8 @@ def _verdict(final: Trial, after: Array, evidence: Evidence, *, rivals: int) -> 
         return "unexplained"
     if not final.effects:
         return "nothing_missing"
-    if not sticks(final) and excess(final, evidence) > beyond(LIKE):
+    exact = not (sticks(final) or has_course(final))
+    if exact and excess(final, evidence) > beyond(LIKE):
         return "unexplained"
     return "ambiguous" if rivals else "found"
 

@@ -16,7 +16,7 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import DIFFERENCE_STEP
 from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.missing import in_balances
-from emir_analysis.diagnosis.select import EXPLAINED, HOPELESS, beyond, excess, limits, quiet
+from emir_analysis.diagnosis.select import EXPLAINED, beyond, excess, limits, quiet
 from emir_analysis.diagnosis.shape import best_shape
 from emir_analysis.diagnosis.straight import Straight
 from emir_analysis.diagnosis.trial import Trial
@@ -49,11 +49,8 @@ def load_course(known: Trial, evidence: Evidence, floor: Array, progress: Progre
     if not may_be_loaded(known, evidence):
         return None
     progress(f"a load of any course beside: {known.name}")
-    begun = _begun(known, evidence, floor)
-    if not excess(begun, evidence) <= beyond(HOPELESS):  # NaN of a run out of bounds
-        return None
-    found = fitted_smoothly(begun, evidence, BENT)
-    if not excess(found, evidence) <= beyond(EXPLAINED):
+    found = fitted_smoothly(_begun(known, evidence, floor), evidence, BENT)
+    if not excess(found, evidence) <= beyond(EXPLAINED):  # NaN of a run out of bounds
         return None
     left = level(evidence.residuals([found.machine])[0])
     return found if quiet(left, limits(found.machine, evidence)) else None

@@ -35,8 +35,8 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
-# times the noise: more, and an effect is only like the truth; not of what sticks, or of a load whose
-# course is told by half seconds
+# Times the noise: more, and an effect is only like the truth. Not of what sticks, or of a load
+# whose course is told by half seconds.
 LIKE = 1.5
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 

@@ -30,6 +30,7 @@ from emir_plant.parameters import Machine
 from emir_plant.unnamed import load
 
 FORETOLD = 0.3  # share of a missing force: signals that foretell more say that it is no such load
+LOUD = 2.0  # times the noise, from which on there is enough of a force to ask what foretells it
 FOLDS = 5  # parts of a recording, each foretold from the others
 RIDGE = 1.0  # expected size of a signal's share in it, in standard deviations of both
 COURSE = "unnamed_load.course."  # begin of its points' paths
@@ -62,9 +63,10 @@ def may_be_loaded(known: Trial, evidence: Evidence) -> bool:
         return False
     residuals = evidence.residuals([known.machine])[0]
     left, limit = level(residuals), limits(known.machine, evidence)
-    if not quiet(np.where(OTHERS, left, np.nan), limit) or left[FORCE] <= limit[FORCE]:
+    noise = float(evidence.floor(known.machine)[FORCE])
+    if not quiet(np.where(OTHERS, left, np.nan), limit) or left[FORCE] < LOUD * noise:
         return False
-    return foretold(residuals[:, FORCE], evidence) <= FORETOLD
+    return foretold(residuals[:, FORCE], evidence, noise) <= FORETOLD
 
 
 def has_course(known: Trial) -> bool:
@@ -94,18 +96,20 @@ def sizes(known: Trial) -> dict[str, tuple[float, float, str]]:
     }
 
 
-def foretold(force: Array, evidence: Evidence) -> float:
+def foretold(force: Array, evidence: Evidence, noise: float) -> float:
     """Return the share of a missing force, (w,) N, that the machine's signals foretell.
 
     In parts of the recording left out: by a function of one of them, or all of them times a
-    constant each, the direction of the motion among them.
+    constant each, the direction of the motion among them. noise: N, which nothing foretells.
     """
     signals = evidence.signals()
     del signals["time"]
     velocity = signals["piston_velocity"][1]
     single = best_shape(force, velocity, signals).share
     known = [values for _, values in signals.values()]
-    return max(single, _together(force, np.column_stack([*known, np.sign(velocity)])))
+    together = _together(force, np.column_stack([*known, np.sign(velocity)]))
+    above = max(1.0 - noise**2 / float(np.mean(force**2)), np.finfo(float).tiny)
+    return max(single, together) / above
 
 
 def _together(missing: Array, signals: Array) -> float:

@@ -173,10 +173,10 @@ class Search:
         if self.drifting or is_enough(self.whole.better(best), self._evidence):
             return False
         self.loaded = self._with_load(self.balanced)
-        if self.loaded is None or self._excess(self.loaded) > beyond(LEFT):
-            others = best.without(LOAD) if LOAD in best.effects else best
-            singles = [t.trial for t in sorted(self.tried, key=lambda t: t.balances)]
-            for known in [others, *(t for t in singles if len(t.effects) == 1)][:MOST_BESIDE_LOAD]:
+        others = best.without(LOAD) if LOAD in best.effects else best
+        singles = [t.trial for t in sorted(self.tried, key=lambda t: t.balances)]
+        for known in [others, *(t for t in singles if len(t.effects) == 1)][:MOST_BESIDE_LOAD]:
+            if self.loaded is None or self._excess(self.loaded) > beyond(LEFT):
                 self._look_beside(known)
         return self.loaded is not None
 

@@ -110,7 +110,7 @@ def test_friction_at_a_place_is_no_load() -> None:
     floor = evidence.floor(joint1())
     known = fit_balances(trial(SHEET, ()), evidence, floor)
     missing = evidence.residuals([known.machine])[0][:, FORCE]
-    assert foretold(missing, evidence) > FORETOLD
+    assert foretold(missing, evidence, float(floor[FORCE])) > FORETOLD
     assert load_course(known, evidence, floor, print) is None
 
 
@@ -124,6 +124,6 @@ def test_of_two_recordings_no_course_is_told(windy: Findings) -> None:
 def test_what_nothing_foretells_is_foretold_by_nothing(windy: Findings) -> None:
     """And a force in proportion to a signal all but wholly."""
     missing = windy.evidence.residuals([elsewhere(windy.chosen).machine])[0][:, FORCE]
-    assert foretold(missing, windy.evidence) < FORETOLD
+    assert foretold(missing, windy.evidence, 0.0) < FORETOLD
     velocity = windy.evidence.signals()["piston_velocity"][1]
-    assert foretold(1e5 * velocity, windy.evidence) > 0.95
+    assert foretold(1e5 * velocity, windy.evidence, 0.0) > 0.95

@@ -22,7 +22,7 @@ from emir_plant.parameters import Machine
 from emir_plant.sheet import Sheet
 
 MADE = 0.9  # of the balances' squares above the noise: the least that a size that drifts makes
-STEADY = 0.5  # of what a steady one leaves of them: the most that one that drifts may
+STEADY = 0.5  # of what any steady one leaves of them: the most that one that drifts may
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,14 @@ def drift(balanced: Trial, evidence: Evidence, floor: Array) -> Drift | None:
     """Return the size whose drift makes most of what the balances lack, if one does.
 
     balanced: without effects, fitted to the balances. floor: (5,) of the balances. None where a
-    steady size says nearly as much.
+    steady size, of any effect, says nearly as much: beside that another effect may be missing.
     """
     balances = _Balances(balanced, evidence, floor)
     plain = balances.least([])[1]
+    slopes = [(size, balances.slope(size)) for size in _sizes(balanced.unknowns.machine)]
+    steady = min((balances.least([each])[1] for each in slopes), default=plain)
     best: Drift | None = None
-    for size in _sizes(balanced.unknowns.machine):
-        slope = balances.slope(size)
-        _, steady = balances.least([(size, slope)])
+    for size, slope in slopes:
         along, before = balances.along * slope, (1.0 - balances.along) * slope
         ends, drifting = balances.least([(size, before), (size, along)])
         share = 1.0 - drifting / plain

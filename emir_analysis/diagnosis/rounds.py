@@ -264,11 +264,16 @@ class Rounds:
     def _on_free_run(self, best: Tried) -> list[Tried]:
         """Return the trials with one effect more that promise most on the free run.
 
-        Where it has long gone astray no first-order step says anything.
+        Where it has long gone astray no first-order step says anything. Begun from the parameters
+        as they are and as a beginning has them, which may have taken an effect's place.
         """
         near = self._head.until(astray(best.trial, self._head) + SHORTEST)
-        found = screen_free_run(self._nearer(best.trial, near), self._sheet, near)
-        begun = [s.trial for s in found[: 2 * MOST_SIMULATED]]
+        bases = dict.fromkeys((best.trial, self._nearer(best.trial, near)))
+        each = [s for base in bases for s in screen_free_run(base, self._sheet, near)]
+        found: dict[tuple[str, ...], Trial] = {}
+        for screened in sorted(each, key=lambda s: s.cost):
+            found.setdefault(screened.trial.effects, screened.trial)
+        begun = list(found.values())[: 2 * MOST_SIMULATED]
         self._next[frozenset(best.trial.effects)] = best, begun[MOST_SIMULATED:]
         return self._all_led(begun[:MOST_SIMULATED], best)
 

@@ -174,4 +174,6 @@ def _added(findings: Findings) -> str:
     """Return what the final machine has more than the re-fitted one."""
     if findings.misstated:
         return f"with another {findings.misstated[0].unknowns.members[-1].path}"
-    return findings.chosen.name if findings.curve is None else "with the curve"
+    if findings.curve is None or findings.verdict == "found":
+        return findings.chosen.name
+    return "with the curve"

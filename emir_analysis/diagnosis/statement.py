@@ -83,7 +83,7 @@ def _of_findings(findings: Findings) -> str:
     left = f"; {left_over}" if left_over else ""
     more = other_reasons(findings.chosen) + _undecided(findings) + _unforeseeable(findings)
     if has_course(findings.chosen):
-        more = _of_course(findings.chosen) + more
+        more = _of_course(findings) + more
     return names + left + more
 
 
@@ -116,12 +116,14 @@ def other_reasons(chosen: Trial) -> str:
     return ""
 
 
-def _of_course(chosen: Trial) -> str:
+def _of_course(findings: Findings) -> str:
     """Return what is known of a load of any course."""
-    course = chosen.machine.unnamed_load.course
+    course = findings.chosen.machine.unnamed_load.course
+    left = math.sqrt(mean_square(findings.chosen, findings.evidence))
     return (
         f"; a load that follows no formula, {min(course):.3g} to {max(course):.3g} N as at the TCP,"
-        " and that nothing in the machine foretells, as wind or pushes"
+        " and that nothing in the machine foretells, as wind or pushes: with it the free run of"
+        f" {findings.evidence.name} is {left:.2f} times the noise off"
     )
 
 

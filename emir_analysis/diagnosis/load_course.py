@@ -6,6 +6,7 @@ one force over time at the TCP or about the joint explains the pressures, the wa
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -35,38 +36,48 @@ FOLDS = 5  # parts of a recording, each foretold from the others
 RIDGE = 1.0  # expected size of a signal's share in it, in standard deviations of both
 COURSE = "unnamed_load.course."  # begin of its points' paths
 SHARE = "unnamed_load.joint_share"
+SHARES = tuple(np.linspace(0.0, 1.0, 6))  # at which it is looked for
 BENT = 1.0  # standard deviation of the course's second differences, in units of its size
 LARGEST = 30.0  # times the size of what is missing: a load goes no further
-OTHERS = [name not in {"force", "bending"} for name in BALANCES]  # balances that no load moves
+INSIDE = 0.7  # of a load about the joint: more, and it may as well be a force in the cylinder
+MOVED = np.array([name in {"force", "bending"} for name in BALANCES])  # balances, by any load
 
 
 def load_course(known: Trial, evidence: Evidence, floor: Array, progress: Progress) -> Trial | None:
     """Return a trial with a load over time, fitted to the free run of one recording.
 
-    known: fitted to the balances, with effects that act elsewhere. None where these tell no force,
-    another balance speaks (but the bending, which loads move), the machine's own signals foretell
-    what is missing, or where the load does not explain all. floor: (5,) of the balances.
+    known: fitted to the balances, with effects that act elsewhere. None where these tell no force
+    and no bending, another of them speaks, the machine's own signals foretell what is missing, or
+    where the load does not explain all or does not bend the boom. floor: (5,) of the balances.
     """
     if not may_be_loaded(known, evidence):
         return None
     progress(f"a load of any course beside: {known.name}")
-    found = fitted_smoothly(_begun(known, evidence, floor), evidence, BENT)
-    if not excess(found, evidence) <= beyond(EXPLAINED):  # NaN of a run out of bounds
+    begun = _begun(known, evidence, floor)
+    if _may_be_inside(begun):
         return None
+    found = fitted_smoothly(begun, evidence, BENT)
+    if _may_be_inside(found) or not excess(found, evidence) <= beyond(EXPLAINED):
+        return None  # NaN of a run out of bounds
     left = level(evidence.residuals([found.machine])[0])
     return found if quiet(left, limits(found.machine, evidence)) else None
 
 
 def may_be_loaded(known: Trial, evidence: Evidence) -> bool:
     """Tell whether a force alone is missing, in one recording, that no signal foretells."""
-    if len(evidence.experiments) > 1 or not evidence.told[FORCE]:
+    if len(evidence.experiments) > 1 or not np.all(evidence.told[MOVED]):
         return False
     residuals = evidence.residuals([known.machine])[0]
     left, limit = level(residuals), limits(known.machine, evidence)
     noise = float(evidence.floor(known.machine)[FORCE])
-    if not quiet(np.where(OTHERS, left, np.nan), limit) or left[FORCE] < LOUD * noise:
+    if not quiet(np.where(MOVED, np.nan, left), limit) or left[FORCE] < LOUD * noise:
         return False
     return foretold(residuals[:, FORCE], evidence, noise) <= FORETOLD
+
+
+def _may_be_inside(loaded: Trial) -> bool:
+    """Tell whether a load acts where friction of the piston does, which bends no arm either."""
+    return loaded.machine.unnamed_load.joint_share > INSIDE
 
 
 def has_course(known: Trial) -> bool:
@@ -144,9 +155,7 @@ def _begun(known: Trial, evidence: Evidence, floor: Array) -> Trial:
         slopes = (1.0 - share) * tip + share * joint
         return straight.least(list(zip(points, slopes.T, strict=True)), expected)
 
-    share = minimize_scalar(
-        lambda s: float(np.sum(least(s)[1] ** 2)), bounds=(0.0, 1.0), method="bounded"
-    ).x
+    share = _lowest(lambda share: float(np.sum(least(share)[1] ** 2)))
     members = (
         *known.unknowns.members,
         *points,
@@ -155,6 +164,13 @@ def _begun(known: Trial, evidence: Evidence, floor: Array) -> Trial:
     x = np.append(least(share)[0], share)
     untold = np.full((x.size, x.size), np.nan)
     return Trial((*known.effects, LOAD), Unknowns(machine, members), x, untold)
+
+
+def _lowest(cost: Callable[[float], float]) -> float:
+    """Return the share at which a cost is lowest; it may have several minima."""
+    best = min(SHARES, key=cost)
+    bounds = max(best - SHARES[1], 0.0), min(best + SHARES[1], 1.0)
+    return float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
 
 
 def _points(size: float) -> tuple[Unknown, ...]:

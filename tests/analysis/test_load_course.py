@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import recorded
-from operated import COMMAND_STEPS, STEPS_PER_SAMPLE
+from operated import COMMAND_STEPS, STEPS_PER_SAMPLE, operated
 from test_diagnosis_search import TOLERANCES
 
 from emir_analysis.diagnosis.balances import FORCE, sensed
@@ -16,7 +16,13 @@ from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.experiment import COMMAND_STEP, OUTPUTS, Experiment
 from emir_analysis.diagnosis.fitting import fit_balances
 from emir_analysis.diagnosis.judged import STAGES, judged
-from emir_analysis.diagnosis.load_course import FORETOLD, elsewhere, foretold, load_course
+from emir_analysis.diagnosis.load_course import (
+    FORETOLD,
+    elsewhere,
+    foretold,
+    load_course,
+    may_be_loaded,
+)
 from emir_analysis.diagnosis.result import diagnosis
 from emir_analysis.diagnosis.trial import trial
 from emir_common.parameter_tree import with_values
@@ -24,6 +30,7 @@ from emir_plant.linkage import strokes
 from emir_plant.parameters import Machine
 from emir_plant.plant import Plant
 from emir_plant.sheet import Sheet, joint1
+from emir_plant.unnamed.load import COURSE
 
 SHEET = Sheet(joint1(), TOLERANCES, {}, ())
 SECONDS = 30.0
@@ -111,6 +118,18 @@ def test_friction_at_a_place_is_no_load() -> None:
     known = fit_balances(trial(SHEET, ()), evidence, floor)
     missing = evidence.residuals([known.machine])[0][:, FORCE]
     assert foretold(missing, evidence, float(floor[FORCE])) > FORETOLD
+    assert load_course(known, evidence, floor, print) is None
+
+
+def test_a_force_that_bends_no_arm_may_be_inside() -> None:
+    """On the piston, where unknown friction acts, too."""
+    time = np.linspace(0.0, SECONDS, COURSE)
+    inside = {"over": 1, "last": SECONDS, "course": [gusts(t) for t in time], "joint_share": 1.0}
+    hidden = with_values(joint1(), {f"unnamed_load.{name}": at for name, at in inside.items()})
+    evidence = Evidence([operated(hidden, recorded.moves(SECONDS, 5))], joint1())
+    floor = evidence.floor(joint1())
+    known = fit_balances(trial(SHEET, ()), evidence, floor)
+    assert may_be_loaded(known, evidence)
     assert load_course(known, evidence, floor, print) is None
 
 

@@ -131,12 +131,12 @@ def _together(missing: Array, signals: Array) -> float:
     rows = np.column_stack([np.ones(missing.size), scaled])
     expected = np.diag([0.0, *np.full(scaled.shape[1], 1.0 / RIDGE**2)])
     part = np.arange(missing.size) * FOLDS // missing.size
-    foretold = np.zeros_like(missing)
+    told = np.zeros_like(missing)
     for k in range(FOLDS):
         seen = part != k
         normal = rows[seen].T @ rows[seen] + expected
-        foretold[~seen] = rows[~seen] @ np.linalg.solve(normal, rows[seen].T @ missing[seen])
-    return 1.0 - float(np.mean((missing - foretold) ** 2) / np.var(missing))
+        told[~seen] = rows[~seen] @ np.linalg.solve(normal, rows[seen].T @ missing[seen])
+    return 1.0 - float(np.mean((missing - told) ** 2) / np.var(missing))
 
 
 def _begun(known: Trial, evidence: Evidence, floor: Array) -> Trial:

@@ -181,8 +181,9 @@ class Search:
         return self.loaded is not None
 
     def _look_beside(self, known: Trial) -> None:
-        """Take a load beside effects where that is clearly better."""
-        if LOAD in known.effects or not may_be_loaded(known, self._evidence):
+        """Take a load beside effects, asked for once, where that is clearly better."""
+        asked = LOAD in known.effects or known.effects in self._courses
+        if asked or not may_be_loaded(known, self._evidence):
             return
         beside = self._with_load(fit_balances(known, self._evidence, self.floor))
         limit = math.inf if self.loaded is None else self.whole.score(self.loaded) - STRONG
@@ -190,7 +191,7 @@ class Search:
             self.loaded = beside
 
     def _with_load(self, known: Trial) -> Trial | None:
-        """Return a trial with a load of any course beside its effects, asked for once."""
+        """Return a trial with a load of any course beside its effects, as it was found once."""
         if known.effects not in self._courses:
             found = load_course(known, self._evidence, self.floor, self._progress)
             self._courses[known.effects] = found

@@ -49,6 +49,7 @@ from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.trial import moved as changed
 from emir_analysis.diagnosis.tried import Tried, free
 from emir_analysis.diagnosis.unknowns import unknowns
+from emir_analysis.errors import InputError
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms
 from emir_common.parameter_tree import declared, with_values
@@ -455,6 +456,37 @@ def test_what_comes_next_is_asked_before_a_series_is_named(monkeypatch: pytest.M
     asked.tried = [asked._fits.fitted(linkage)]
     (found,) = searched.nearest_the_whole([asked.tried[0].trial])
     assert found.effects == ("vessel_compliance",)
+
+
+def test_without_a_gauge_effects_are_begun_from_parameters_as_they_are_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those that were fitted to a beginning have taken the place of the hose."""
+    soft = with_values(joint1(), {"effects.vessel_compliance.lowering": 6e-12})
+    evidence = Evidence([without_p_s(moved(soft))], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    rounds, plain = searched._rounds, searched._plain()
+    asked_from = []
+
+    def hidden_from_fitted(known: Trial, sheet: Sheet, near: Evidence) -> list[Screened]:
+        asked_from.append(known)
+        found = screen_free_run(known, sheet, near)
+        return [s for s in found if known is plain or "vessel_compliance" not in s.trial.effects]
+
+    monkeypatch.setattr("emir_analysis.diagnosis.rounds.screen_free_run", hidden_from_fitted)
+    found = rounds._on_free_run(rounds.scored(plain))
+    assert len(asked_from) == 2
+    assert ("vessel_compliance",) in [tried.trial.effects for tried in found]
+
+
+def test_the_noise_of_a_machine_that_cannot_run_is_the_stated_one_s() -> None:
+    """Of a trial, such as one that falls over the dead centre; of the sheet's it is an error."""
+    evidence = Evidence([moved(joint1())], joint1())
+    fallen = with_values(joint1(), {"effects.external_load.mean": -1e5})
+    assert np.isnan(free_runs([fallen], evidence.experiments[0], [(0.8, 20e5)])).all()
+    np.testing.assert_array_equal(evidence.floor(fallen), evidence.floor(joint1()))
+    with pytest.raises(InputError, match=r"cannot rest at .* check the data sheet"):
+        Evidence(evidence.experiments, fallen).floor(fallen)
 
 
 def test_without_a_gauge_what_one_balance_speaks_against_is_asked_as_well() -> None:

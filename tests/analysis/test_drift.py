@@ -76,3 +76,12 @@ def test_a_drifting_gauge_is_no_load(length: float, bias: float) -> None:
     assert found.drift is not None
     assert found.drift.path == "effects.sensor_bias.pressure_lifting"
     assert not any(line.startswith("pairs") for line in said)
+
+
+def test_a_steady_fault_beside_a_drifting_one_is_no_drift() -> None:
+    """A gain of the gauge that goes from one value to another says nearly as much as both."""
+    hidden = {
+        "effects.sensor_bias.pressure_lifting": 15e5,
+        "effects.flow_gain_drift.change": 0.1,
+    }
+    assert asked(moved(with_values(joint1(), hidden), 40.0, seed=6)) is None

@@ -79,9 +79,13 @@ def test_a_drifting_gauge_is_no_load(length: float, bias: float) -> None:
 
 
 def test_a_steady_fault_beside_a_drifting_one_is_no_drift() -> None:
-    """A gain of the gauge that goes from one value to another says nearly as much as both."""
+    """As the boom sinks, p_H rises, and a gain of the gauge that falls is nearly a bias."""
+    sinking = np.zeros(1000)
+    sinking[30:990] = np.tile(np.r_[np.full(60, -0.22), np.zeros(20)], 12)
     hidden = {
         "effects.sensor_bias.pressure_lifting": 15e5,
         "effects.flow_gain_drift.change": 0.1,
     }
-    assert asked(moved(with_values(joint1(), hidden), 40.0, seed=6)) is None
+    run = operated(with_values(joint1(), hidden), sinking, angle=1.3)
+    assert run.outputs[-1, H] > 2.0 * run.outputs[0, H]
+    assert asked(run) is None

@@ -7,6 +7,7 @@ frame that turns with the boom.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -15,6 +16,16 @@ from numpy.typing import NDArray
 from emir_plant.parameters import GRAVITY, Geometry
 
 Array = NDArray[np.float64]
+
+
+class PointMass(NamedTuple):
+    """A mass, kg, and its place along the stretched boom; 1: at the TCP, more: beyond it."""
+
+    mass: float
+    place: float
+
+
+NO_MASS = PointMass(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -54,8 +65,11 @@ class BoomModes:
     shapes: Array
 
 
-def section_model(geometry: Geometry) -> SectionModel:
-    """Assemble mass, stiffness and gravity of the section chain (paper Fig. 2)."""
+def section_model(geometry: Geometry, carried: PointMass = NO_MASS) -> SectionModel:
+    """Assemble mass, stiffness and gravity of the section chain (paper Fig. 2).
+
+    carried: besides the geometry's payload, which is at the TCP.
+    """
     sections, length = geometry.sections, geometry.section_length
     mass = geometry.boom_mass / sections
     centres = length * (np.tril(np.ones((sections, sections)), -1) + 0.5 * np.eye(sections))
@@ -66,12 +80,24 @@ def section_model(geometry: Geometry) -> SectionModel:
         bend[k : k + 2] = (-1.0, 1.0)
         springs += geometry.section_spring * np.outer(bend, bend)
     inertia = mass * centres.T @ centres + mass * length**2 / 12.0 * np.eye(sections)
-    inertia += geometry.payload * np.outer(tip, tip)
-    weight = GRAVITY * (mass * centres.sum(axis=0) + geometry.payload * tip)
+    weight = GRAVITY * mass * centres.sum(axis=0)
+    for load in (PointMass(geometry.payload, 1.0), carried):
+        at = _displacement(geometry, load.place)
+        inertia += load.mass * np.outer(at, at)
+        weight += GRAVITY * load.mass * at
     join = rigid_arm_joints(geometry)
     return SectionModel(
         join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join
     )
+
+
+def _displacement(geometry: Geometry, place: float) -> Array:
+    """Return the transverse displacement of a place, 1, per rotation of each section, (s,) m."""
+    length = geometry.section_length
+    beyond = place * geometry.boom_length - length * np.arange(geometry.sections)
+    inside: Array = np.clip(beyond, 0.0, length)
+    inside[-1] = max(beyond[-1], 0.0)  # the last section goes on straight
+    return inside
 
 
 def rigid_arm_joints(geometry: Geometry) -> Array:
@@ -85,12 +111,13 @@ def rigid_arm_joints(geometry: Geometry) -> Array:
 
 
 @lru_cache(maxsize=16)
-def boom_modes(geometry: Geometry) -> BoomModes:
+def boom_modes(geometry: Geometry, carried: PointMass = NO_MASS) -> BoomModes:
     """Reduce the section model to its `modes_kept` lowest modes.
 
-    Raises ValueError when there are fewer coordinates than modes to keep.
+    carried: besides the geometry's payload. Raises ValueError when there are fewer coordinates
+    than modes to keep.
     """
-    model = section_model(geometry)
+    model = section_model(geometry, carried)
     kept = geometry.modes_kept
     if kept > len(model.weight):
         raise ValueError(f"modes_kept = {kept}: the boom has only {len(model.weight)} modes")

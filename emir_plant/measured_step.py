@@ -146,7 +146,8 @@ def _beyond_threshold(measured: Array, p: Any) -> float:
 @compiled_in_place
 def _opened_by(opening: float, piloted: bool, time: float, p: Any) -> float:  # noqa: FBT001
     if piloted:
-        return 1.0 - (1.0 - opening) * math.exp(-time / p.time_constant_opening)
+        settled = logic_block_fault.fully_open(p)
+        return settled - (settled - opening) * math.exp(-time / p.time_constant_opening)
     return opening * math.exp(-time / logic_block_fault.time_constant_closing(p))
 
 

@@ -12,7 +12,7 @@ import scipy
 
 from emir_plant import core
 from emir_plant.core import Array
-from emir_plant.effects import linkage_error, terms
+from emir_plant.effects import linkage_error, logic_block_fault, terms
 from emir_plant.hydraulics import chambers
 from emir_plant.plant import Plant, SimulationError
 
@@ -99,7 +99,7 @@ def _state(plant: Plant, angle: float, unknown: Array, velocity: float, command:
     x = plant.initial(angle, lowering)
     x[core.P_H] += more
     x[core.DROOP] = sum(sagging)
-    x[core.SPOOL], x[core.LOGIC] = command, 1.0
+    x[core.SPOOL], x[core.LOGIC] = command, logic_block_fault.fully_open(p)
     rate = velocity / linkage_error.lever_arm(angle, p)
     x[core.MODES + p["mode_joint"].size] = rate / p["mode_joint"][0]
     load = chambers.piston_force(x[core.P_H], x[core.P_S], p)

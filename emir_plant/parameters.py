@@ -163,7 +163,7 @@ class Machine:
 
     @property
     def payload(self) -> float:
-        """The mass at the TCP, kg: the stated payload and that of the effect."""
+        """The mass that is carried, kg: the stated payload and that of the effect."""
         return self.geometry.payload + self.effects.payload.mass
 
     def __post_init__(self) -> None:

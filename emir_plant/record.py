@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emir_common.quantity import quantities
-from emir_plant.boom import BoomModes, boom_modes
+from emir_plant.boom import BoomModes, PointMass, boom_modes
 from emir_plant.effects import REGISTRY
 from emir_plant.linkage import third_side
 from emir_plant.parameters import Geometry, Machine
@@ -49,9 +49,10 @@ def record(machine: Machine) -> NDArray[Any]:
     group's name in front. The boom's modes are added with the prefix `mode_`. One element, since
     numba reads an element of an array twenty times faster than a record by itself.
     """
-    geometry = _with_effects(machine)
+    geometry, load = machine.geometry, machine.effects.payload
     # the modes do not know of this factor: machines that differ in it share them
-    modes = boom_modes(dataclasses.replace(geometry, modal_frequency=1.0))
+    plain = dataclasses.replace(geometry, modal_frequency=1.0)
+    modes = boom_modes(plain, PointMass(load.mass, load.place))
     values = dict(zip(_PATHS, _read(machine), strict=True)) | _modes(modes, geometry)
     values["length_stretched"] = third_side(
         geometry.triangle_a, geometry.triangle_b, geometry.triangle_gamma0
@@ -66,11 +67,6 @@ def _layout(names: tuple[str, ...], modes: int) -> np.dtype[Any]:
     return np.dtype(
         [(n, np.float64, (modes,) if n.startswith("mode_") else shapes.get(n, ())) for n in names]
     )
-
-
-def _with_effects(machine: Machine) -> Geometry:
-    """Return the geometry with those effects in it that change a parameter of the boom."""
-    return dataclasses.replace(machine.geometry, payload=machine.payload)
 
 
 def _modes(modes: BoomModes, geometry: Geometry) -> dict[str, Any]:

@@ -52,10 +52,10 @@ def acting(angle: float, parameters: NDArray[Any]) -> Acting:
 def seated(
     lifting: float, lowering: float, force: float, parameters: NDArray[Any]
 ) -> tuple[float, float]:
-    """Return how far the logic block is open, 0 or 1, and where the piston rests in its play, m.
+    """Return how far the logic block is open and where the piston rests in its play, m.
 
     lifting, lowering: pressures, Pa. force: of the oil, N. parameters: (1,) the machine's record.
     """
     p = parameters[0]
     pilot = logic_block.pilot_pressure(lifting, lowering, p)
-    return 1.0 if logic_block.is_piloted(pilot, p) else 0.0, backlash.flank(force, p)
+    return logic_block.settled(pilot, p), backlash.flank(force, p)

@@ -33,7 +33,7 @@ class Boom(NamedTuple):
 
 
 def boom(n: Numbers) -> Boom:
-    """Return the modes of the boom with the payload at its tip."""
+    """Return the modes of the boom with the payload at its tip, and what else it carries."""
     elements = n.arms * n.sections_per_arm
     length, mass = n.boom_length / elements, n.boom_mass / elements
     nodes = elements + 1
@@ -41,8 +41,10 @@ def boom(n: Numbers) -> Boom:
     for k in range(elements):
         masses[k : k + 2, k : k + 2] += mass / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
         load[k : k + 2] += 0.5 * mass * GRAVITY
-    masses[-1, -1] += n.payload
-    load[-1] += n.payload * GRAVITY
+    for more, place in ((n.payload, 1.0), (n.carried, n.carried_at)):
+        heights_there = _between_nodes(place * elements, nodes)
+        masses += more * np.outer(heights_there, heights_there)
+        load += more * GRAVITY * heights_there
     kinks = np.zeros((elements - 1, nodes))
     for k in range(elements - 1):
         kinks[k, k : k + 3] = np.array([1.0, -2.0, 1.0]) / length
@@ -62,3 +64,14 @@ def boom(n: Numbers) -> Boom:
         weight=load @ heights,
         tip=heights[-1],
     )
+
+
+def _between_nodes(place: float, nodes: int) -> Array:
+    """Return the share, (nodes,), that each node's height has in that of a place, in elements.
+
+    Beyond the tip the last element goes on straight.
+    """
+    before = min(int(place), nodes - 2)
+    shares = np.zeros(nodes)
+    shares[before : before + 2] = before + 1 - place, place - before
+    return shares

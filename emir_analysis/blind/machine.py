@@ -248,7 +248,7 @@ class Machine:
         dx[2:HYDRAULIC] = (
             rate,
             self.acceleration(command, spool, rate),
-            self._logic_rate(logic, self.pilot(p_h, p_s)),
+            self.logic_rate(logic, self.pilot(p_h, p_s)),
         )
         half = HYDRAULIC + modes.size // 2
         dx[HYDRAULIC:half] = x[half : self.modes.stop]
@@ -268,7 +268,8 @@ class Machine:
         dp_s = (q[1] - out_s + n.area_lowering * moved) * self.stiffness(p[1], v_s, lifting=False)
         return _no_pull(dp_h / v_h, p[0]), _no_pull(dp_s / v_s, p[1])
 
-    def _logic_rate(self, opened: float, pilot: float) -> float:
+    def logic_rate(self, opened: float, pilot: float) -> float:
+        """Return how fast the logic block opens, 1/s, at its opening and pilot pressure, Pa."""
         if pilot > self.n.threshold:
             return (1.0 - opened) / self.n.time_constant_opening
         return -opened / self.n.time_constant_closing

@@ -58,6 +58,8 @@ class Numbers:
     pressure_noise: float
     deflection_noise: float
     payload: float = 0.0
+    carried: float = 0.0  # kg, besides, ...
+    carried_at: float = 1.0  # ... along the boom, 1: at its tip
     rate: float = 100.0  # 1/s, of the sensors
     command_period: float = 0.032  # s
 

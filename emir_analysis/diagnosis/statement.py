@@ -13,7 +13,6 @@ from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.judged import Judged, carries
 from emir_analysis.diagnosis.judgement import judgement
 from emir_analysis.diagnosis.load_course import has_course
-from emir_analysis.diagnosis.loads import LOAD
 from emir_analysis.diagnosis.moments import Moments, moments
 from emir_analysis.diagnosis.mounting import spring_in_series
 from emir_analysis.diagnosis.remainder import remainder
@@ -27,7 +26,6 @@ from emir_common.parameter_tree import declared
 MANY = 0.1  # share of the samples
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
-MOSTLY = 0.5  # of a load, vertical
 DRIFTED = 3.0  # times the noise, over a second
 CLOCK = 0.02  # s, more than the same transducers and filters make of two pressures
 
@@ -98,7 +96,7 @@ def _of_parameters(findings: Findings) -> str:
 
 
 def other_reasons(chosen: Trial) -> str:
-    """Return what else shows so: gauges, another clock, a leaning base, a mass not at the TCP."""
+    """Return what else shows so: gauges, another clock, a leaning base."""
     effects = chosen.machine.effects
     bias, delay = effects.sensor_bias, effects.sensor_delay
     biases = np.array([bias.pressure_lifting, bias.pressure_lowering])
@@ -106,10 +104,6 @@ def other_reasons(chosen: Trial) -> str:
         return "; both pressures read an atmosphere less, as gauges do that do not read absolutely"
     if {"sensor_bias", "linkage_error"} <= set(chosen.effects) and bias.angle:
         return "; a machine that is not level shows the same"
-    load = effects.external_load
-    steady = {"payload", LOAD} <= set(chosen.effects) and load.frequency == 0.0
-    if steady and load.vertical_share > MOSTLY:
-        return "; a payload beside a steady vertical load is what a mass elsewhere on the boom is"
     late = np.array([delay.pressure_lifting, delay.pressure_lowering])
     if late.min() > CLOCK and np.ptp(late) < ALIKE * late.max():
         return "; both pressures come equally late, as by another clock"

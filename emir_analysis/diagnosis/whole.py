@@ -230,10 +230,11 @@ class Whole:
         """Return a trial fitted again with what is usual for shares in between, where as good.
 
         Along with a size beside it a share is led far where little changes, as that of a leak of
-        a chamber whose pressure is not measured.
+        a chamber whose pressure is not measured. The same of what is plain.
         """
         for k, unknown in enumerate(fitted.unknowns.members):
-            if unknown.is_share and unknown.low < fitted.x[k] < unknown.high:
+            between = unknown.is_share and unknown.low < fitted.x[k] < unknown.high
+            if between or unknown.is_plain:
                 usual = round(declared(self._sheet.machine)[unknown.path][1])
                 fixed = fitted.fixed(unknown.path, float(usual))
                 again = refine_free_run(fixed, self._evidence, fitted)

@@ -23,6 +23,7 @@ class Effect:
     other_law: fields that give the effect another law where they are not 0; a search begins at 0.
     given: fields that say what the others mean, and are not searched.
     forms: values of given fields that make another effect of it; a search tries one by one.
+    plain: fields that are as usual unless recordings say otherwise.
     is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """
 
@@ -34,6 +35,7 @@ class Effect:
     none_or_above: ClassVar[dict[str, float]] = {}
     given: ClassVar[tuple[str, ...]] = ()
     forms: ClassVar[dict[str, tuple[float, ...]]] = {}
+    plain: ClassVar[tuple[str, ...]] = ()
     is_series: ClassVar[bool] = False
     other_law: ClassVar[tuple[str, ...]] = ()
 

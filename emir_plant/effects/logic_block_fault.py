@@ -10,23 +10,29 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class LogicBlockFault(Effect):
-    """Threshold, pilot or closing time off.
+    """Threshold, pilot or closing time off, or a poppet that does not open all the way.
 
-    p_threshold + threshold; T_closing (1 + closing); and a pilot pressure mixed with a share of
-    the other chamber's (a leaking pilot line).
+    p_threshold + threshold; T_closing (1 + closing); a pilot pressure mixed with a share of
+    the other chamber's (a leaking pilot line); and y4 goes to 1 - blocked in place of 1.
     """
 
     balance: ClassVar[Balance] = "logic block"
-    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "pilot")
+    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "pilot", "blocked")
     source: ClassVar[str] = (
-        "spring setting, a sticking or blocked pilot; magnitudes of a maladjusted valve"
+        "spring setting, a sticking or blocked pilot, dirt; magnitudes of a maladjusted valve"
     )
-    trial: ClassVar[dict[str, float]] = {"threshold": 5e5, "closing": 0.5, "pilot": 0.1}
+    trial: ClassVar[dict[str, float]] = {
+        "threshold": 5e5,
+        "closing": 0.5,
+        "pilot": 0.1,
+        "blocked": 0.3,
+    }
     stepwise: ClassVar[tuple[str, ...]] = ("threshold",)  # crossed by few minima of p_H, or by all
 
     threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
     closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)
     pilot: float = quantity("1", 0.0, 1.0, "share of the other chamber's pressure", default=0.0)
+    blocked: float = quantity("1", 0.0, 0.95, "share of the opening that is missing", default=0.0)
 
 
 @compiled
@@ -45,3 +51,9 @@ def time_constant_closing(p: Any) -> float:
 def pilot_pressure(own: float, other: float, p: Any) -> float:
     """Return the pressure that works on the pilot, Pa, from those of both chambers."""
     return own + p.logic_block_fault_pilot * (other - own)
+
+
+@compiled
+def fully_open(p: Any) -> float:
+    """Return y4 once the block has opened as far as it does."""
+    return 1.0 - p.logic_block_fault_blocked

@@ -1,4 +1,4 @@
-"""A load at the TCP that the model does not know of."""
+"""A load on the boom that the model does not know of."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,11 +9,16 @@ from emir_plant.effects.base import Balance, Effect
 
 @dataclass(frozen=True)
 class Payload(Effect):
-    """Point mass at the TCP, added to the stated payload: weight, inertia, other modes."""
+    """Point mass, added to the stated payload: weight, inertia, other modes.
+
+    At the TCP, unless it is said to be elsewhere along the stretched boom.
+    """
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("mass",)
     source: ClassVar[str] = "paper 1: up to 1500 kg"
     trial: ClassVar[dict[str, float]] = {"mass": 100.0}
+    plain: ClassVar[tuple[str, ...]] = ("place",)
 
     mass: float = quantity("kg", 0.0, 3000.0, "beyond the stated payload", default=0.0)
+    place: float = quantity("1", 0.3, 1.2, "from joint to TCP, 1: at the TCP", default=1.0)

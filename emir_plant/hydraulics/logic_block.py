@@ -22,7 +22,16 @@ def is_piloted(pilot_pressure: float, p: Any) -> bool:
 
 @compiled
 def opening_rate(opening: float, pilot_pressure: float, p: Any) -> float:
-    """Return dy4/dt, 1/s: y4 goes to 1 while the pilot pressure, Pa, is above the threshold."""
+    """Return dy4/dt, 1/s: y4 goes to 1 while the pilot pressure, Pa, is above the threshold.
+
+    To less than 1 where something is in its way.
+    """
     if is_piloted(pilot_pressure, p):
-        return (1.0 - opening) / p.time_constant_opening
+        return (logic_block_fault.fully_open(p) - opening) / p.time_constant_opening
     return -opening / logic_block_fault.time_constant_closing(p)
+
+
+@compiled
+def settled(pilot_pressure: float, p: Any) -> float:
+    """Return y4 once it has settled at a pilot pressure, Pa."""
+    return logic_block_fault.fully_open(p) if is_piloted(pilot_pressure, p) else 0.0

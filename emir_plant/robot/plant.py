@@ -133,7 +133,7 @@ class RobotPlant:
             own = actuators.own(x, k)
             own[P_H], own[P_S] = high, other
             pilot = logic_block.pilot_pressure(high, other, p)
-            own[LOGIC] = 1.0 if logic_block.is_piloted(pilot, p) else 0.0
+            own[LOGIC] = logic_block.settled(pilot, p)
         x[SIZE : SIZE + self.mechanics.size] = held.coordinates
         return x
 

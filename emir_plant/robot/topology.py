@@ -78,7 +78,7 @@ def topology(robot: Robot) -> Topology:
     g, tree = robot.main.geometry, _Tree()
     carrier = tree.joint(0, pin.JointModelRZ(), np.zeros(3), "base")
     tree.body(carrier, _column(robot), "column")
-    joints, cuts, linkages = [carrier], [], []
+    joints, cuts, linkages, sections = [carrier], [], [], []
     place = np.array([0.0, 0.0, robot.base.height])
     for number in range(1, JOINTS + 1):
         linkages.append(_linkage(tree, carrier, place, robot, number))
@@ -89,6 +89,7 @@ def topology(robot: Robot) -> Topology:
         joints.append(carrier)
         section = _section(robot, number)
         tree.body(carrier, section, name)
+        sections.append(carrier)
         place = np.array([g.section_length, 0.0, 0.0])
         for k in range(2, g.sections_per_arm + 1):
             name = f"arm{number}_section{k}"
@@ -98,7 +99,9 @@ def topology(robot: Robot) -> Topology:
             )
             cuts.append(shift)
             tree.body(carrier, section, name)
-    _load(tree, carrier, place, robot)
+            sections.append(carrier)
+    _loads(tree, sections, robot)
+    tree.frame(carrier, place, TCP, pin.FrameType.OP_FRAME)
     first = tree.model.frames[tree.model.getFrameId("arm1_section1")].parentJoint
     tree.frame(first, np.zeros(3), "joint1_lever", pin.FrameType.BODY)
     return _indexed(tree, joints, cuts, linkages)
@@ -151,10 +154,15 @@ def _linkage(
     return found | {LEVER: lever, THRUST_BAR: bar}
 
 
-def _load(tree: _Tree, carrier: int, place: NDArray[np.float64], robot: Robot) -> None:
-    load = pin.Inertia(robot.main.payload, np.zeros(3), np.zeros((3, 3)))
-    tree.model.appendBodyToJoint(carrier, load, pin.SE3(np.eye(3), place))
-    tree.frame(carrier, place, TCP, pin.FrameType.OP_FRAME)
+def _loads(tree: _Tree, sections: list[int], robot: Robot) -> None:
+    """Hang the stated payload on the TCP, and that of an effect where it is along the arms."""
+    g, effect = robot.main.geometry, robot.main.effects.payload
+    for mass, share in ((g.payload, 1.0), (effect.mass, effect.place)):
+        way = share * g.boom_length
+        k = min(int(way / g.section_length), len(sections) - 1)
+        place = np.array([way - k * g.section_length, 0.0, 0.0])
+        load = pin.Inertia(mass, np.zeros(3), np.zeros((3, 3)))
+        tree.model.appendBodyToJoint(sections[k], load, pin.SE3(np.eye(3), place))
 
 
 def _polar(length: float, direction: float) -> NDArray[np.float64]:

@@ -78,6 +78,12 @@ def search(
     return Search(evidence, sheet, lambda _: None), sheet, evidence
 
 
+def diagnosed(missing: dict[str, float]) -> Trial:
+    """Return the trial that a search ends with, as it is named."""
+    searched, _, _ = search(missing)
+    return searched.named(searched.run()[0])
+
+
 def needed(searched: Search, chosen: Trial) -> Trial:
     """Return a trial without the effects that are not needed."""
     return searched.elimination.needed(chosen, searched.refitted)
@@ -348,6 +354,25 @@ def test_a_load_of_one_recording_may_not_be_another_s() -> None:
     assert "a load from outside may have come at other times there" in said
     unloaded = judged(replace(found, verdict="found"), evidence.experiments)
     assert "a load from outside" not in statement(found, unloaded)
+
+
+@pytest.mark.parametrize("place", [0.8, 1.0])
+def test_where_on_the_boom_a_payload_sits_is_told(place: float) -> None:
+    """At the TCP unless the recording says otherwise: then it is not fitted."""
+    there = {"effects.payload.mass": 200.0, "effects.payload.place": place}
+    found = diagnosed(there)
+    assert found.effects == ("payload",)
+    payload = found.machine.effects.payload
+    assert payload.mass == pytest.approx(200.0, rel=0.01)
+    assert payload.place == pytest.approx(place, abs=0.005)
+    assert ("effects.payload.place" in found.unknowns.values(found.x)) == (place != 1.0)
+
+
+def test_a_poppet_that_does_not_open_all_the_way_is_found() -> None:
+    found = diagnosed({"effects.logic_block_fault.blocked": 0.6})
+    assert found.effects == ("logic_block_fault",)
+    fitted = found.unknowns.values(found.x)
+    assert fitted["effects.logic_block_fault.blocked"] == pytest.approx(0.6, abs=0.03)
 
 
 def test_a_fault_of_the_logic_block_that_shuts_in_the_part_held_back_alone_is_found() -> None:

@@ -11,12 +11,9 @@ from emir_analysis.diagnosis.curves import Curve
 from emir_analysis.diagnosis.judged import carries
 from emir_analysis.diagnosis.judgement import _beyond, _foreseen, _furthest
 from emir_analysis.diagnosis.remainder import _beside, remainder
-from emir_analysis.diagnosis.statement import _rejected, other_reasons
+from emir_analysis.diagnosis.statement import _rejected
 from emir_analysis.diagnosis.where import Where
-from emir_common.parameter_tree import with_values
-from emir_plant.sheet import joint1
 
-BOTH = ("payload", "external_load")
 QUIET = {"force": 1.0, "lifting_chamber": 1.0, "lowering_chamber": 1.0, "bending": 1.0}
 
 
@@ -130,24 +127,6 @@ def test_a_force_that_bends_the_boom_or_passes_may_be_a_load(
         ),
     )  # fmt: skip
     assert ("it may be a load from outside" in remainder(findings)) == load
-
-
-@pytest.mark.parametrize(
-    ("effects", "load", "said"),
-    [
-        (BOTH, {"mean": -178.0, "vertical_share": 1.0}, True),
-        (BOTH, {"mean": -178.0, "vertical_share": 0.0}, False),
-        (BOTH, {"mean": 90.0, "frequency": 0.4, "vertical_share": 1.0}, False),
-        (("external_load",), {"mean": -178.0, "vertical_share": 1.0}, False),
-    ],
-)  # fmt: skip
-def test_a_payload_that_weighs_otherwise_than_it_swings_is_a_mass_elsewhere(
-    effects: tuple[str, ...], load: dict[str, float], *, said: bool
-) -> None:
-    """A mass m at d has the moment m g d and the inertia m d^2: no payload has both."""
-    values = {f"effects.external_load.{name}": value for name, value in load.items()}
-    chosen = SimpleNamespace(effects=effects, machine=with_values(joint1(), values))
-    assert ("a mass elsewhere on the boom" in other_reasons(chosen)) == said
 
 
 @pytest.mark.parametrize(("left", "said"), [(9.0, True), (18.5, False)])

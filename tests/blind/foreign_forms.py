@@ -21,6 +21,7 @@ from emir_analysis.blind.hidden import (
 from emir_analysis.blind.machine import Array, Sizes
 from emir_analysis.blind.numbers import Numbers
 
+LOGIC = 4  # where the state has the logic block's opening
 LAMINAR = 1e5  # Pa, below which a hole is laminar
 
 
@@ -269,6 +270,47 @@ class SwingAboutMean(Hidden):
         return super().tip_force(time) + swing
 
 
+class LoadElsewhere(Hidden):
+    """A load on the boom, as near the joint as half way or a little beyond the TCP."""
+
+    name = "payload~elsewhere"
+    grows = ("hung_mass",)
+    scales: ClassVar[dict[str, Scale]] = {"hung_mass": boom_mass}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        place = float(random.choice([random.uniform(0.5, 0.95), random.uniform(1.02, 1.1)]))
+        return {"hung_mass": between(random, 50.0, 600.0), "hung_place": place}
+
+    def changed(self, numbers: Numbers) -> Numbers:
+        n, s = super().changed(numbers), self.sizes
+        return Numbers(**{**vars(n), "carried": s["hung_mass"], "carried_at": s["hung_place"]})
+
+
+class BlockedPoppet(Hidden):
+    """A logic block whose poppet meets something on its way."""
+
+    name = "logic_block_fault~blocked"
+    grows = ("in_the_way",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"in_the_way": between(random, 0.4, 0.75)}
+
+    def start(self, angle: float, p_s: float) -> Array:
+        x = super().start(angle, p_s)
+        x[LOGIC] = min(x[LOGIC], self._stop)
+        return x
+
+    def logic_rate(self, opened: float, pilot: float) -> float:
+        rate = super().logic_rate(opened, pilot)
+        return min(rate, 0.0) if opened >= self._stop else rate
+
+    @property
+    def _stop(self) -> float:
+        return max(1.0 - self.sizes["in_the_way"], 0.05)
+
+
 class OtherOil(Hidden):
     """Oil softer or stiffer than stated, beyond what the maker allows for, in one chamber or both.
 
@@ -506,6 +548,8 @@ FOREIGN: tuple[type[Hidden], ...] = (
     FillingHose,
     SlowLoad,
     SwingAboutMean,
+    LoadElsewhere,
+    BlockedPoppet,
     OtherOil,
     SameSlope,
     OneEdge,

@@ -20,7 +20,7 @@ from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
 from emir_analysis.blind.plan import foreign_effects
 from emir_analysis.blind.recording import Run, Start, repeated
 from emir_common.parameter_tree import with_values
-from emir_plant.boom import boom_modes
+from emir_plant.boom import PointMass, boom_modes
 from emir_plant.parameters import GRAVITY
 from emir_plant.plant import Plant
 from emir_plant.sensors import readings
@@ -80,9 +80,13 @@ def test_what_is_judged_has_no_share_in_the_question() -> None:
 
 
 @pytest.mark.parametrize("payload", [0.0, 700.0])
-def test_finite_elements_have_the_modes_of_the_section_chain(payload: float) -> None:
-    elements = boom(replace(STATED, payload=payload))
-    chain = boom_modes(replace(SHEET.geometry, payload=payload))
+@pytest.mark.parametrize("carried", [(0.0, 1.0), (300.0, 0.37), (200.0, 1.08)])
+def test_finite_elements_have_the_modes_of_the_section_chain(
+    payload: float, carried: tuple[float, float]
+) -> None:
+    mass, place = carried
+    elements = boom(replace(STATED, payload=payload, carried=mass, carried_at=place))
+    chain = boom_modes(replace(SHEET.geometry, payload=payload), PointMass(mass, place))
     sign = np.sign(elements.tip)
     np.testing.assert_allclose(elements.stiffness, chain.frequency**2, rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(elements.joint * sign, chain.joint, rtol=1e-6)
@@ -224,6 +228,11 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"hangs": -500.0, "swings": 0.8, "swing_frequency": 0.4, "swing_phase": 1.2},
         {"mean": -500.0, "force": -400.0, "frequency": 0.4, "phase": 1.2},
     ),
+    _OTHER["payload~elsewhere"]: (
+        {"hung_mass": 300.0, "hung_place": 0.72},
+        {"mass": 300.0, "place": 0.72},
+    ),
+    _OTHER["logic_block_fault~blocked"]: ({"in_the_way": 0.6}, {"blocked": 0.6}),
     _OTHER["vessel_compliance~beta"]: (
         {"softer": -0.3, "where": 1.0},
         {"lowering": -0.3 * STATED.volume_lowering_0 / STATED.beta, "wall_share": 1.0},

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from emir_common.parameter_tree import with_values
 from emir_plant import core
-from emir_plant.boom import boom_modes, section_model
+from emir_plant.boom import PointMass, boom_modes, section_model
 from emir_plant.linearize import linearize
 from emir_plant.plant import Plant
 from emir_plant.sheet import joint1
@@ -55,6 +56,27 @@ def test_section_model_has_the_mass_and_moment_of_the_boom() -> None:
     moment = GEOMETRY.boom_mass * GRAVITY * GEOMETRY.boom_length / 2.0
     assert model.weight.sum() == pytest.approx(moment, rel=1e-12)
     assert np.abs(model.stiffness @ rigid).max() < 1e-6  # turning as a whole bends nothing
+
+
+@pytest.mark.parametrize("place", [0.37, 0.85, 1.0, 1.1])
+def test_a_mass_on_the_boom_weighs_and_turns_where_it_is(place: float) -> None:
+    """A mass m at d has the moment m g d and the inertia m d^2: no mass at the TCP has both."""
+    empty, loaded = section_model(GEOMETRY), section_model(GEOMETRY, PointMass(300.0, place))
+    rigid, reach = np.ones(len(empty.weight)), place * GEOMETRY.boom_length
+    inertia = rigid @ (loaded.mass - empty.mass) @ rigid
+    assert inertia == pytest.approx(300.0 * reach**2, rel=1e-10)
+    moment = (loaded.weight - empty.weight).sum()
+    assert moment == pytest.approx(300.0 * GRAVITY * reach, rel=1e-10)
+
+
+def test_a_mass_half_way_bends_the_boom_as_a_beam() -> None:
+    """Its tip sags by P a^2 (3 L - a) / (6 E I)."""
+    there = {"effects.payload.mass": 500.0, "effects.payload.place": 0.5}
+    empty, loaded = Plant(joint1()), Plant(with_values(joint1(), there))
+    sag = [p.outputs(p.initial(FORTY_FIVE)).tcp_deflection for p in (empty, loaded)]
+    force, reach = 500.0 * GRAVITY * math.cos(FORTY_FIVE), 0.5 * GEOMETRY.boom_length
+    beam = force * reach**2 * (3.0 * GEOMETRY.boom_length - reach) / (6.0 * BENDING_STIFFNESS)
+    assert sag[0] - sag[1] == pytest.approx(beam, rel=0.02)
 
 
 def test_more_modes_than_coordinates_are_refused() -> None:

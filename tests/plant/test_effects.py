@@ -31,6 +31,7 @@ from emir_plant.effects import (
     vessel_compliance,
 )
 from emir_plant.hydraulics import logic_block, valve
+from emir_plant.hydraulics.flows import Edges, Pressures, flows
 from emir_plant.parameters import GRAVITY, Machine
 from emir_plant.plant import Plant
 from emir_plant.sensors import measure, readings
@@ -801,6 +802,19 @@ def test_fault_of_the_logic_block_changes_threshold_closing_and_pilot() -> None:
     assert logic_block_fault.time_constant_closing(p) == pytest.approx(2.0 * 0.3)
     assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.6)
     assert logic_block.pilot_pressure(100e5, 20e5, p) == pytest.approx(80e5)
+
+
+def test_a_blocked_poppet_opens_as_far_as_it_can_and_throttles_what_leaves() -> None:
+    """Over y4^2 its resistance is that of a block whose k is 1 / (1 - blocked)^2 times as large."""
+    p = _with(logic_block_fault={"blocked": 0.6}).record[0]
+    assert logic_block.opening_rate(0.4, 120e5, p) == 0.0
+    assert logic_block.settled(120e5, p) == pytest.approx(0.4)
+    assert logic_block.settled(1e5, p) == 0.0
+    narrow = with_values(MACHINE, {"resistances.k_block_out": 2.7e10 / 0.4**2})
+    lowering = Edges(-0.6, -0.6)
+    pressures = Pressures(200e5, 80e5, 20e5)
+    throttled = flows(lowering, pressures, 0.4, p)
+    assert throttled == pytest.approx(flows(lowering, pressures, 1.0, Plant(narrow).record[0]))
 
 
 # sensors

@@ -10,7 +10,8 @@ import pytest
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir_ros[robot]'")
 
-from emir_plant import linkage as triangle  # noqa: E402 (only with Pinocchio)
+from emir_common.parameter_tree import with_values  # noqa: E402 (only with Pinocchio)
+from emir_plant import linkage as triangle  # noqa: E402
 from emir_plant.boom import boom_modes  # noqa: E402
 from emir_plant.plant import Plant  # noqa: E402
 from emir_plant.robot.dynamics import Mechanics  # noqa: E402
@@ -187,6 +188,20 @@ def test_joint_torques_at_rest_are_weight_times_arm_by_hand(posture: np.ndarray)
         by_hand += 700.0 * out[-1]
         assert torques[k + 1] == pytest.approx(GRAVITY * by_hand, rel=1e-9)
     assert abs(torques[0]) < 1e-6
+
+
+@pytest.mark.parametrize(("place", "arm", "along"), [(0.37, 1, 0.85), (1.0, 4, 1.0), (1.1, 4, 1.5)])
+def test_a_mass_on_the_arms_pulls_at_the_joints_below_it(
+    place: float, arm: int, along: float
+) -> None:
+    """An effect's payload at a place along the stretched arms, bent: weight times arm by hand."""
+    there = {"main.effects.payload.mass": 300.0, "main.effects.payload.place": place}
+    empty, loaded = Mechanics(ROBOT), Mechanics(with_values(ROBOT, there))
+    q, still = rigid(empty, BENT), np.zeros(96)
+    more = (loaded.bias(q, still) - empty.bias(q, still))[empty.topology.joints[1:]]
+    level = GEOMETRY.boom_length / 5.0 * np.cos(np.cumsum(BENT[1:]))
+    reach = [level[k:arm].sum() + along * level[arm] if k <= arm else 0.0 for k in range(5)]
+    assert more == pytest.approx(300.0 * GRAVITY * np.array(reach), rel=1e-9, abs=1e-6)
 
 
 def test_energy_is_kept_in_free_swing_without_damping() -> None:

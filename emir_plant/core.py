@@ -15,6 +15,7 @@ from emir_plant.effects import (
     command_delay,
     external_load,
     linkage_error,
+    pressure_dependent_friction,
     sensor_delay,
     supply_pressure_droop,
     terms,
@@ -73,6 +74,7 @@ class Motion(NamedTuple):
     velocity: float  # of the piston, m/s
     joint_velocity: float  # the same without the piston's play, m/s
     force: float  # of the oil on the piston, N
+    pressing: float  # of it on bearings and seals, N
     offset_rate: float  # of the piston against the joint, m/s
 
 
@@ -103,6 +105,7 @@ def standing_motion(x: Array, p: Any) -> Motion:
         joint_velocity,
         joint_velocity,
         chambers.piston_force(x[P_H], x[P_S], p),
+        pressure_dependent_friction.pressing(x[P_H], x[P_S], p),
         0.0,
     )
 
@@ -119,6 +122,7 @@ def crossing_motion(standing: Motion, rate: float) -> Motion:
         standing.joint_velocity + rate,
         standing.joint_velocity,
         standing.force,
+        standing.pressing,
         rate,
     )
 
@@ -126,13 +130,13 @@ def crossing_motion(standing: Motion, rate: float) -> Motion:
 @compiled_in_place
 def situation_of(motion: Motion) -> terms.Situation:
     """Return what the dry friction depends on beside the velocity."""
-    return terms.Situation(motion.force, motion.stroke)
+    return terms.Situation(motion.pressing, motion.stroke)
 
 
 @compiled_in_place
 def bristles_of(motion: Motion, p: Any) -> bristles.Bristles:
     """Return the seals' bristles as velocity and force make them."""
-    return terms.bristles(motion.joint_velocity, motion.force, p)
+    return terms.bristles(motion.joint_velocity, motion.pressing, p)
 
 
 @compiled_in_place

@@ -12,8 +12,12 @@ import scipy
 
 from emir_plant import core
 from emir_plant.core import Array
-from emir_plant.effects import linkage_error, logic_block_fault, terms
-from emir_plant.hydraulics import chambers
+from emir_plant.effects import (
+    linkage_error,
+    logic_block_fault,
+    pressure_dependent_friction,
+    terms,
+)
 from emir_plant.plant import Plant, SimulationError
 
 BAR = 1e5
@@ -102,6 +106,6 @@ def _state(plant: Plant, angle: float, unknown: Array, velocity: float, command:
     x[core.SPOOL], x[core.LOGIC] = command, logic_block_fault.fully_open(p)
     rate = velocity / linkage_error.lever_arm(angle, p)
     x[core.MODES + p["mode_joint"].size] = rate / p["mode_joint"][0]
-    load = chambers.piston_force(x[core.P_H], x[core.P_S], p)
-    x[core.BRISTLES] = math.copysign(terms.bristles(velocity, load, p).sliding, velocity)
+    pressing = pressure_dependent_friction.pressing(x[core.P_H], x[core.P_S], p)
+    x[core.BRISTLES] = math.copysign(terms.bristles(velocity, pressing, p).sliding, velocity)
     return x

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 class Situation(NamedTuple):
     """What dry friction depends on beside the piston's velocity."""
 
-    load: float  # force of the oil on the piston, N
+    pressing: float  # on bearings and seals, N
     stroke: float  # of the piston, m
 
 
@@ -50,34 +50,35 @@ def strokes(angles: Array, forces: Array, p: Any) -> Array:
 
 
 @compiled
-def friction(velocity: float, load: float, p: Any) -> float:
+def friction(velocity: float, pressing: float, p: Any) -> float:
     """Return the force against the piston's motion, N, at its velocity, m/s.
 
-    load: force of the oil on the piston, N. Without a friction that depends on the stroke.
+    pressing: on bearings and seals, N. Without a friction that depends on the stroke.
     """
-    return named_dry_friction(velocity, load, p) + viscous_friction.friction(velocity, p)
+    return named_dry_friction(velocity, pressing, p) + viscous_friction.friction(velocity, p)
 
 
 @compiled
 def dry_friction(velocity: float, at: Situation, p: Any) -> float:
     """Return all friction that is steep near standstill, N, at the piston's velocity, m/s."""
-    return named_dry_friction(velocity, at.load, p) + unnamed_force.friction(velocity, at.stroke, p)
+    named = named_dry_friction(velocity, at.pressing, p)
+    return named + unnamed_force.friction(velocity, at.stroke, p)
 
 
 @compiled
-def named_dry_friction(velocity: float, load: float, p: Any) -> float:
+def named_dry_friction(velocity: float, pressing: float, p: Any) -> float:
     """Return the part of `friction` that is steep near standstill, N."""
     dry = coulomb_friction.friction(velocity, p) + stribeck_friction.friction(velocity, p)
-    return dry + pressure_dependent_friction.friction(velocity, load, p)
+    return dry + pressure_dependent_friction.friction(velocity, pressing, p)
 
 
 @compiled
-def bristles(velocity: float, load: float, p: Any) -> Bristles:
+def bristles(velocity: float, pressing: float, p: Any) -> Bristles:
     """Return the bristles of all seals; as for `friction`.
 
     Each is as stiff as makes its friction, while sliding fast, over the way on which it gives.
     """
-    pressed = p.pressure_dependent_friction_coefficient * abs(load)
+    pressed = p.pressure_dependent_friction_coefficient * abs(pressing)
     coulomb = _over(p.coulomb_friction_force, p.coulomb_friction_presliding)
     stribeck = _over(p.stribeck_friction_force, p.stribeck_friction_presliding)
     by_load = _over(pressed, p.pressure_dependent_friction_presliding)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
 from emir_plant.core import LOGIC, P_H, P_S, SPOOL, SPOOL_RATE
-from emir_plant.effects import Effects, terms
+from emir_plant.effects import Effects, pressure_dependent_friction, terms
 from emir_plant.hydraulics import chambers, logic_block, valve
 from emir_plant.hydraulics.flows import Pressures, delivered, flows
 from emir_plant.jit import compiled
@@ -218,19 +218,27 @@ def oil_force(x: Array, k: int, actuators: NDArray[Any]) -> float:
 
 
 @compiled
-def forces(x: Array, velocities: Array, actuators: NDArray[Any], result: Array) -> None:
-    """Write the forces of oil and friction on the pistons, (6,), N, and N m on the base."""
-    for k in range(ACTUATORS):
-        oil = oil_force(x, k, actuators)
-        result[k] = oil - terms.friction(velocities[k], oil, actuators[k])
+def pressing(x: Array, k: int, actuators: NDArray[Any]) -> float:
+    """Return the force on bearings and seals of actuator k, N; N m on the base."""
+    each = own(x, k)
+    return pressure_dependent_friction.pressing(each[P_H], each[P_S], actuators[k])
 
 
 @compiled
-def friction_slope(velocity: float, load: float, p: Any) -> float:
+def forces(x: Array, velocities: Array, actuators: NDArray[Any], result: Array) -> None:
+    """Write the forces of oil and friction on the pistons, (6,), N, and N m on the base."""
+    for k in range(ACTUATORS):
+        friction = terms.friction(velocities[k], pressing(x, k, actuators), actuators[k])
+        result[k] = oil_force(x, k, actuators) - friction
+
+
+@compiled
+def friction_slope(velocity: float, pressing: float, p: Any) -> float:
     """Return d(friction)/d(velocity), N s/m, at a piston velocity, m/s, never negative.
 
-    load: force of the oil on the piston, N.
+    pressing: on bearings and seals, N.
     """
     step = 1e-5  # m/s
-    rise = terms.friction(velocity + step, load, p) - terms.friction(velocity - step, load, p)
+    rise = terms.friction(velocity + step, pressing, p)
+    rise -= terms.friction(velocity - step, pressing, p)
     return max(rise / (2.0 * step), 0.0)

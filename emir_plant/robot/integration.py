@@ -126,8 +126,8 @@ def _stiffness_added(oil: Array, h: float, ahead: float, motion: Array, t: Table
             added[t.cuts[c, i]] = 0.5 * h * t.damper[i] + 0.25 * h * h * t.spring[i]
     for k in range(ACTUATORS):
         # friction may be steep where a piston stands; an end stop always is
-        load = actuators.oil_force(oil, k, t.drives)
-        damping = actuators.friction_slope(motion[VELOCITY, k], load, t.drives[k])
+        pressing = actuators.pressing(oil, k, t.drives)
+        damping = actuators.friction_slope(motion[VELOCITY, k], pressing, t.drives[k])
         stiffness = 0.0
         if k > 0 and _meets_stop(motion[STROKE, k], motion[VELOCITY, k] * ahead, t.stops[:, k]):
             damping += t.stops[STOP_DAMPING, k]

@@ -535,6 +535,25 @@ class LoadOnBristles(_OnBristles):
         return self.slides_at(0.0, x) / self.sizes["gives"]
 
 
+class PressedSeals(Hidden):
+    """Dry friction of seals, each pressed on by the pressure of its own chamber."""
+
+    name = "pressure_dependent_friction~seals"
+    grows = ("seals_rub",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"seals_rub": between(random, 0.01, 0.03), "rubs_from": between(random, 2e-4, 2e-3)}
+
+    def accelerations(self, x: Array, time: float, angle: float, push: float) -> Array:
+        n, modes = self.n, self.boom.joint
+        spin = float(modes @ x[self.modes][modes.size :])
+        pressed = float(x[0]) * n.area_lifting + float(x[1]) * n.area_lowering
+        velocity = self.lever_arm(angle) * spin
+        dry = velocity / math.hypot(velocity, self.sizes["rubs_from"])
+        return super().accelerations(x, time, angle, push - self.sizes["seals_rub"] * pressed * dry)
+
+
 FOREIGN: tuple[type[Hidden], ...] = (
     TurbulentLeak,
     TurbulentDrip,
@@ -558,4 +577,5 @@ FOREIGN: tuple[type[Hidden], ...] = (
     LaggingCommand,
     StribeckOnBristles,
     LoadOnBristles,
+    PressedSeals,
 )

@@ -275,6 +275,10 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"rubs": 0.03, "gives": 5e-5, "bristle_time": 0.0},
         {"coefficient": 0.03, "presliding": 5e-5},
     ),
+    _OTHER["pressure_dependent_friction~seals"]: (
+        {"seals_rub": 0.03, "rubs_from": 1e-3},
+        {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0, "seal_share": 1.0},
+    ),
 }
 
 

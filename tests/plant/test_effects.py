@@ -24,6 +24,7 @@ from emir_plant.effects import (
     flow_gain_drift,
     linkage_error,
     logic_block_fault,
+    pressure_dependent_friction,
     sensor_delay,
     supply_pressure_droop,
     terms,
@@ -268,6 +269,18 @@ def test_pressure_dependent_friction_is_a_share_of_the_load_and_smooth_at_rest()
         assert terms.friction(-0.05, load, p) == pytest.approx(-0.02 * 6e5)
     slope = 0.02 * 6e5 / p["pressure_dependent_friction_smoothing_speed"]
     assert terms.friction(1e-6, 6e5, p) == pytest.approx(1e-6 * slope, rel=1e-5)
+
+
+def test_bearings_carry_the_difference_of_the_chambers_and_seals_each_its_own() -> None:
+    """Under equal forces from both sides bearings carry nothing, and seals both."""
+    cylinder = MACHINE.cylinder
+    low = 40e5 * cylinder.area_lifting / cylinder.area_lowering
+    for share in (0.0, 0.5, 1.0):
+        p = _with(pressure_dependent_friction={"coefficient": 0.02, "seal_share": share}).record[0]
+        pressing = pressure_dependent_friction.pressing(40e5, low, p)
+        assert pressing == pytest.approx(share * 2.0 * 40e5 * cylinder.area_lifting)
+        emptied = pressure_dependent_friction.pressing(40e5, 0.0, p)
+        assert emptied == pytest.approx(40e5 * cylinder.area_lifting)
 
 
 def test_payload_is_felt_as_weight_and_inertia() -> None:

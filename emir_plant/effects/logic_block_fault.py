@@ -27,7 +27,8 @@ class LogicBlockFault(Effect):
         "pilot": 0.1,
         "blocked": 0.3,
     }
-    stepwise: ClassVar[tuple[str, ...]] = ("threshold",)  # crossed by few minima of p_H, or by all
+    # the threshold is crossed by few minima of the pilot pressure, or by all
+    stepwise: ClassVar[tuple[str, ...]] = ("threshold", "pilot")
 
     threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
     closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)

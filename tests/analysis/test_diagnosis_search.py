@@ -375,6 +375,18 @@ def test_a_poppet_that_does_not_open_all_the_way_is_found() -> None:
     assert fitted["effects.logic_block_fault.blocked"] == pytest.approx(0.6, abs=0.03)
 
 
+def test_a_pilot_line_that_leaks_much_is_found_beside_a_gauge_that_is_off() -> None:
+    """Nothing of it shows until the pilot pressure meets the threshold: slopes say nothing."""
+    hidden = {"logic_block_fault.pilot": 0.9, "sensor_gain.pressure_lowering": -0.036}
+    values = {f"effects.{path}": value for path, value in hidden.items()}
+    evidence = Evidence([moved(with_values(joint1(), values), 30.0)], joint1())
+    searched = Search(evidence, Sheet(joint1(), TOLERANCES, {}, ()), lambda _: None)
+    found = searched.named(searched.run()[0])
+    assert set(found.effects) == {"logic_block_fault", "sensor_gain"}
+    for path, value in values.items():
+        assert found.unknowns.values(found.x)[path] == pytest.approx(value, rel=0.05)
+
+
 def test_a_fault_of_the_logic_block_that_shuts_in_the_part_held_back_alone_is_found() -> None:
     """It lifts for two thirds of the time: what the fits see is explained without."""
     stated = joint1()

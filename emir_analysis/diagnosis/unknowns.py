@@ -61,11 +61,6 @@ class Unknown:
         return is_share(self.path)
 
     @property
-    def is_plain(self) -> bool:
-        """Tell whether it is an effect's parameter that is as usual unless recordings say so."""
-        return self._field is not None and self._field[1] in self._field[0].plain
-
-    @property
     def usual(self) -> float:
         """What a parameter of an effect is where nobody says otherwise, SI unit; NaN: of none."""
         if self._field is None:

@@ -21,6 +21,7 @@ from emir_analysis.diagnosis.friction_laws import (
 from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD, mean_while_it_acts
 from emir_analysis.diagnosis.next_law import Laws, next_laws
+from emir_analysis.diagnosis.payload_place import elsewhere
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -65,6 +66,7 @@ class Whole:
                     fitted = self._led_again(fitted)
                 else:
                     fitted = self._with_other_shares(self._refined_again(fitted))
+            fitted = self._with_payload_elsewhere(fitted)
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
@@ -172,6 +174,17 @@ class Whole:
                 fitted = next((end for end in ends if self.score(end) <= score), fitted)
         return fitted
 
+    def _with_payload_elsewhere(self, fitted: Trial) -> Trial:
+        """Return a trial whose payload is not at the TCP, where that explains much better.
+
+        What a search has begun elsewhere need not be just there.
+        """
+        begun = elsewhere(fitted)
+        if begun is None or not (fitted.unusual or self._excess(fitted) > beyond(LEFT)):
+            return fitted
+        found = refine_free_run(begun, self._evidence)
+        return found if self.score(found) < self.score(fitted) - STRONG else fitted
+
     def _with_simple_load(self, fitted: Trial) -> Trial:
         """Return a trial whose load from outside is steady or does not decay, if that is as good.
 
@@ -230,11 +243,10 @@ class Whole:
         """Return a trial fitted again with what is usual for shares in between, where as good.
 
         Along with a size beside it a share is led far where little changes, as that of a leak of
-        a chamber whose pressure is not measured. The same of what is plain.
+        a chamber whose pressure is not measured.
         """
         for k, unknown in enumerate(fitted.unknowns.members):
-            between = unknown.is_share and unknown.low < fitted.x[k] < unknown.high
-            if between or unknown.is_plain:
+            if unknown.is_share and unknown.low < fitted.x[k] < unknown.high:
                 usual = round(declared(self._sheet.machine)[unknown.path][1])
                 fixed = fitted.fixed(unknown.path, float(usual))
                 again = refine_free_run(fixed, self._evidence, fitted)

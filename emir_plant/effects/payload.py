@@ -18,7 +18,8 @@ class Payload(Effect):
     sizes: ClassVar[tuple[str, ...]] = ("mass",)
     source: ClassVar[str] = "paper 1: up to 1500 kg"
     trial: ClassVar[dict[str, float]] = {"mass": 100.0}
-    plain: ClassVar[tuple[str, ...]] = ("place",)
+    given: ClassVar[tuple[str, ...]] = ("place",)
+    forms: ClassVar[dict[str, tuple[float, ...]]] = {"place": (1.0, 0.5)}
 
     mass: float = quantity("kg", 0.0, 3000.0, "beyond the stated payload", default=0.0)
     place: float = quantity("1", 0.3, 1.2, "from joint to TCP, 1: at the TCP", default=1.0)

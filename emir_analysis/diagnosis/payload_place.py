@@ -1,0 +1,20 @@
+"""Where on the boom a payload sits: at the TCP, unless the recordings say otherwise.
+
+Looked for where one at the TCP leaves something: whatever else is missing would lead it away.
+"""
+
+from emir_analysis.diagnosis.trial import Trial
+from emir_analysis.diagnosis.unknowns import Unknown
+from emir_common.quantity import quantities
+from emir_plant.effects.payload import Payload
+
+PLACE = "effects.payload.place"
+
+
+def elsewhere(known: Trial) -> Trial | None:
+    """Return a trial whose payload's place is fitted as well; None: it has none, or is already."""
+    if "payload" not in known.effects or PLACE in known.unknowns.values(known.x):
+        return None
+    about = quantities(Payload)["place"]
+    place = Unknown(PLACE, about.unit, 0.0, 1.0, about.low, about.high, known.form[PLACE], False)
+    return known.formed({PLACE: Payload.place}).also(place)

@@ -127,9 +127,10 @@ class Rounds:
     def ask_further(self, best: Trial) -> None:
         """Fit what was next to a series of a trial on the free run, as many as were fitted there.
 
-        A series has terms enough to stand for what comes close. Where sensors are missing, what got
-        no further than the balances as well.
+        A series has terms enough to stand for what comes close. What got no further than the
+        balances as well; where they are all told, what is close to the trial there.
         """
+        limit = self.scored(best).balances + CLOSE if self._evidence.complete else np.inf
         for effect in best.effects:
             others = frozenset(best.effects) - {effect}
             if REGISTRY[effect].is_series and others in self._next:
@@ -137,9 +138,8 @@ class Rounds:
                 known = {frozenset(tried.trial.effects) for tried in self.tried}
                 new = [t for t in begun if frozenset(t.effects) not in known]
                 self.tried += side_by_side(self._fits.fitted, self._all_led(new, beside))
-            if not self._evidence.complete:
-                promising = self._no_further(others)
-                self.tried += side_by_side(self._fits.fitted, promising)
+            promising = self._no_further(others, limit)
+            self.tried += side_by_side(self._fits.fitted, promising)
 
     def further(self, known: Tried) -> list[Tried]:
         """Return what is better with one effect more of what got no further than the balances.
@@ -148,13 +148,17 @@ class Rounds:
         """
         return self._better(self._no_further(frozenset(known.trial.effects)), known)
 
-    def _no_further(self, effects: frozenset[str]) -> list[Tried]:
-        """Take out the trials with one effect more that got no further than the balances."""
+    def _no_further(self, effects: frozenset[str], limit: float = np.inf) -> list[Tried]:
+        """Take out the trials with one effect more that got no further than the balances.
+
+        limit: of their score there.
+        """
         simulated = {frozenset(t.trial.effects) for t in self.tried if t.free_run is not None}
         left = [t for t in self.tried if frozenset(t.trial.effects) not in simulated]
         more = [t for t in left if effects < set(t.trial.effects)]
         alike = [t for t in more if len(t.trial.effects) == len(effects) + 1]
-        taken = sorted(alike, key=lambda t: t.balances)[:MOST_SIMULATED]
+        close = [t for t in alike if t.balances <= limit]
+        taken = sorted(close, key=lambda t: t.balances)[:MOST_SIMULATED]
         self.tried = [t for t in self.tried if t not in taken]
         return taken
 

@@ -27,6 +27,7 @@ from emir_analysis.diagnosis.select import (
     AT_NOISE,
     HOPELESS,
     LEFT,
+    MOST,
     STRONG,
     beyond,
     excess,
@@ -175,7 +176,7 @@ class Whole:
         return fitted
 
     def _with_payload_elsewhere(self, fitted: Trial) -> Trial:
-        """Return a trial whose payload is not at the TCP, where that explains much better.
+        """Return a trial whose payload is not at the TCP, where that takes most of the rest away.
 
         What a search has begun elsewhere need not be just there.
         """
@@ -183,7 +184,7 @@ class Whole:
         if begun is None or not (fitted.unusual or self._excess(fitted) > beyond(LEFT)):
             return fitted
         found = refine_free_run(begun, self._evidence)
-        return found if self.score(found) < self.score(fitted) - STRONG else fitted
+        return found if self._excess(found) < MOST * self._excess(fitted) else fitted
 
     def _with_simple_load(self, fitted: Trial) -> Trial:
         """Return a trial whose load from outside is steady or does not decay, if that is as good.

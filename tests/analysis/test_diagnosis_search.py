@@ -356,7 +356,7 @@ def test_a_load_of_one_recording_may_not_be_another_s() -> None:
     assert "a load from outside" not in statement(found, unloaded)
 
 
-@pytest.mark.parametrize("place", [0.8, 1.0])
+@pytest.mark.parametrize("place", [0.35, 0.8, 1.0])
 def test_where_on_the_boom_a_payload_sits_is_told(place: float) -> None:
     """At the TCP unless the recording says otherwise: then it is not fitted."""
     there = {"effects.payload.mass": 200.0, "effects.payload.place": place}

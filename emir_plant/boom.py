@@ -80,14 +80,14 @@ def section_model(geometry: Geometry, carried: PointMass = NO_MASS) -> SectionMo
         bend[k : k + 2] = (-1.0, 1.0)
         springs += geometry.section_spring * np.outer(bend, bend)
     inertia = mass * centres.T @ centres + mass * length**2 / 12.0 * np.eye(sections)
-    weight = GRAVITY * mass * centres.sum(axis=0)
+    moment = mass * centres.sum(axis=0)
     for load in (PointMass(geometry.payload, 1.0), carried):
         at = _displacement(geometry, load.place)
         inertia += load.mass * np.outer(at, at)
-        weight += GRAVITY * load.mass * at
+        moment += load.mass * at
     join = rigid_arm_joints(geometry)
     return SectionModel(
-        join.T @ inertia @ join, join.T @ springs @ join, join.T @ weight, tip @ join
+        join.T @ inertia @ join, join.T @ springs @ join, join.T @ (GRAVITY * moment), tip @ join
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
-from emir_analysis.diagnosis.fitting import free_run_problem
+from emir_analysis.diagnosis.fitting import free_run_problem, refine_free_run
 from emir_analysis.diagnosis.friction_laws import is_along_the_way, is_gradual
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY, weight_of_noise
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT
@@ -134,7 +134,22 @@ class Growths:
     def _as_grown(self, known: Trial, led: Led) -> Grown:
         fitted, before = known.continued(led.fitted), known.continued(led.before)
         given_up = led.time < self._end
+        if not given_up:
+            fitted = self._from_the_middle(fitted, led.fitted.misfit)
         return Grown(fitted, led.fitted.misfit, led.time, given_up, before, led.time_before)
+
+
+    def _from_the_middle(self, fitted: Trial, left: float) -> Trial:
+        """Return a trial that leaves little from the middle of what the state at rest may be, too.
+
+        From there it may stick at other instants than from the state that was fitted along, with
+        which it left so much: then it is fitted once more, if that is better.
+        """
+        from_there = _misfit(fitted, self._evidence)
+        if from_there <= FOLLOWS * left:
+            return fitted
+        again = refine_free_run(fitted, self._evidence)
+        return again if _misfit(again, self._evidence) < from_there else fitted
 
 
 def from_rest(known: Trial, evidence: Evidence) -> Array:

@@ -138,7 +138,6 @@ class Growths:
             fitted = self._from_the_middle(fitted, led.fitted.misfit)
         return Grown(fitted, led.fitted.misfit, led.time, given_up, before, led.time_before)
 
-
     def _from_the_middle(self, fitted: Trial, left: float) -> Trial:
         """Return a trial that leaves little from the middle of what the state at rest may be, too.
 

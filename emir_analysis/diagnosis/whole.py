@@ -180,8 +180,8 @@ class Whole:
 
         What a search has begun elsewhere need not be just there.
         """
-        begun = elsewhere(fitted)
-        if begun is None or not (fitted.unusual or self._excess(fitted) > beyond(LEFT)):
+        begun, at_tcp = elsewhere(fitted), fitted.machine.effects.payload.place == 1.0
+        if begun is None or (at_tcp and self._excess(fitted) <= beyond(LEFT)):
             return fitted
         found = refine_free_run(begun, self._evidence)
         return found if self._excess(found) < MOST * self._excess(fitted) else fitted

@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.free_run import free_runs
 from emir_analysis.diagnosis.friction_laws import viscous_is_heard
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
+from emir_analysis.diagnosis.rounds import CLOSE
 from emir_analysis.diagnosis.run_errors import at_rest, mean_square
 from emir_analysis.diagnosis.screening import OnBalances, Screened, screen_free_run
 from emir_analysis.diagnosis.search import Search
@@ -543,6 +544,23 @@ def test_without_a_gauge_what_one_balance_speaks_against_is_asked_as_well() -> N
     assert excess(simulated.trial, evidence) < beyond(EXPLAINED)
     assert searched.nearest_the_whole([simulated.trial])[0].effects == told.trial.effects
     assert all(t.free_run is not None for t in rounds.tried)
+
+
+def test_what_is_close_on_the_balances_is_simulated_before_another_set_is_named() -> None:
+    """Where all balances are told, what is far from the best there is not."""
+    hidden = {"effects.valve_hysteresis.width": 0.05, "effects.linkage_error.scale": -0.02}
+    searched, sheet, evidence = search(hidden)
+    rounds, head = searched._rounds, evidence.head(SEEN)
+    loop = fit_balances(trial(sheet, ("valve_hysteresis",)), head, searched.floor)
+    beside = ("linkage_error", "flow_gain_drift", "valve_null_offset")
+    sets = [trial(sheet, ("valve_hysteresis", each), loop) for each in beside]
+    told, drift, far = (rounds.scored(fit_balances(each, head, searched.floor)) for each in sets)
+    best = rounds._fits.fitted(drift)
+    limit = rounds.scored(best.trial).balances + CLOSE
+    rounds.tried = [told, replace(far, balances=limit + 1.0)]
+    rounds.ask_further(best.trial)
+    simulated = [t.trial.effects for t in rounds.tried if t.free_run is not None]
+    assert simulated == [told.trial.effects]
 
 
 def test_what_was_simulated_from_elsewhere_is_not_asked_again() -> None:

@@ -11,8 +11,8 @@ from emir_plant.effects.payload import Payload
 PLACE = "effects.payload.place"
 
 
-def elsewhere(known: Trial) -> Trial | None:
-    """Return a trial whose payload's place is fitted as well; None: it has none, or is already."""
+def with_place(known: Trial) -> Trial | None:
+    """Return a trial whose payload's place is fitted, too; None: no payload, or it is already."""
     if "payload" not in known.effects or PLACE in known.unknowns.values(known.x):
         return None
     about = quantities(Payload)["place"]

@@ -157,7 +157,7 @@ class Rounds:
         left = [t for t in self.tried if frozenset(t.trial.effects) not in simulated]
         more = [t for t in left if effects < set(t.trial.effects)]
         alike = [t for t in more if len(t.trial.effects) == len(effects) + 1]
-        close = [t for t in alike if t.balances <= limit]
+        close = (t for t in alike if t.balances <= limit)
         taken = sorted(close, key=lambda t: t.balances)[:MOST_SIMULATED]
         self.tried = [t for t in self.tried if t not in taken]
         return taken

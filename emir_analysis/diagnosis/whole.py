@@ -21,7 +21,7 @@ from emir_analysis.diagnosis.friction_laws import (
 from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD, mean_while_it_acts
 from emir_analysis.diagnosis.next_law import Laws, next_laws
-from emir_analysis.diagnosis.payload_place import elsewhere
+from emir_analysis.diagnosis.payload_place import with_place
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -38,6 +38,7 @@ from emir_analysis.diagnosis.trial import Trial, moved, with_all_terms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
 from emir_plant.effects import REGISTRY
+from emir_plant.effects.payload import Payload
 from emir_plant.sheet import Sheet
 
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
@@ -180,7 +181,7 @@ class Whole:
 
         What a search has begun elsewhere need not be just there.
         """
-        begun, at_tcp = elsewhere(fitted), fitted.machine.effects.payload.place == 1.0
+        begun, at_tcp = with_place(fitted), fitted.machine.effects.payload.place == Payload.place
         if begun is None or (at_tcp and self._excess(fitted) <= beyond(LEFT)):
             return fitted
         found = refine_free_run(begun, self._evidence)

@@ -376,6 +376,16 @@ def test_a_poppet_that_does_not_open_all_the_way_is_found() -> None:
     assert fitted["effects.logic_block_fault.blocked"] == pytest.approx(0.6, abs=0.03)
 
 
+@pytest.mark.parametrize("seals", [0.0, 1.0])
+def test_friction_of_seals_is_told_from_that_of_bearings(seals: float) -> None:
+    path = "effects.pressure_dependent_friction"
+    found = diagnosed({f"{path}.coefficient": 0.03, f"{path}.seal_share": seals})
+    assert found.effects == ("pressure_dependent_friction",)
+    friction = found.machine.effects.pressure_dependent_friction
+    assert friction.coefficient == pytest.approx(0.03, rel=0.02)
+    assert friction.seal_share == pytest.approx(seals, abs=0.05)
+
+
 def test_a_pilot_line_that_leaks_much_is_found_beside_a_gauge_that_is_off() -> None:
     """Nothing of it shows until the pilot pressure meets the threshold: slopes say nothing."""
     hidden = {"logic_block_fault.pilot": 0.9, "sensor_gain.pressure_lowering": -0.036}

@@ -18,10 +18,10 @@ from emir_analysis.blind.hidden import (
     either_sign,
     lifting_force,
 )
-from emir_analysis.blind.machine import Array, Sizes
+from emir_analysis.blind.machine import HYDRAULIC, Array, Sizes
 from emir_analysis.blind.numbers import Numbers
 
-LOGIC = 4  # where the state has the logic block's opening
+LOGIC = HYDRAULIC - 1  # where the state has the logic block's opening
 LAMINAR = 1e5  # Pa, below which a hole is laminar
 
 

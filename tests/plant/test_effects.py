@@ -823,6 +823,8 @@ def test_a_blocked_poppet_opens_as_far_as_it_can_and_throttles_what_leaves() -> 
     assert logic_block.opening_rate(0.4, 120e5, p) == 0.0
     assert logic_block.settled(120e5, p) == pytest.approx(0.4)
     assert logic_block.settled(1e5, p) == 0.0
+    resting = Plant(with_values(joint1(), {"effects.logic_block_fault.blocked": 0.6}))
+    assert resting.initial(FORTY_FIVE, 30e5)[core.LOGIC] == pytest.approx(0.4)
     narrow = with_values(MACHINE, {"resistances.k_block_out": 2.7e10 / 0.4**2})
     lowering = Edges(-0.6, -0.6)
     pressures = Pressures(200e5, 80e5, 20e5)

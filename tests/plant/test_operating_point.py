@@ -18,6 +18,12 @@ EFFECTS = {
     "friction": {"effects.coulomb_friction.force": 1e4},
     "viscous friction": {"effects.viscous_friction.coefficient": 1e5},
     "friction by the load": {"effects.pressure_dependent_friction.coefficient": 0.05},
+    "friction of seals that give": {
+        "effects.pressure_dependent_friction.coefficient": 0.02,
+        "effects.pressure_dependent_friction.seal_share": 1.0,
+        "effects.pressure_dependent_friction.presliding": 5e-4,
+    },
+    "blocked poppet": {"effects.logic_block_fault.blocked": 0.4},
     "another lever arm": {"effects.linkage_error.scale": 0.05},
     "leak": {"effects.internal_leakage.coefficient": 1e-12},
     "sagging supply": {"effects.supply_pressure_droop.resistance": 1.5e9},
@@ -34,6 +40,7 @@ def test_the_machine_goes_on_as_it_was_found(effect: str, velocity: float) -> No
     assert truth[:, TRUTH["velocity"]] == pytest.approx(np.full(301, velocity), rel=0.02)
     for pressure in ("pressure_lifting", "pressure_lowering"):
         assert np.ptp(truth[:, TRUTH[pressure]]) < 1.5e5
+    assert np.ptp(truth[:, TRUTH["logic_block"]]) < 1e-12
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

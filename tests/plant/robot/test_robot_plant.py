@@ -12,6 +12,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is missing: pip install 'emir
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError
+from emir_plant.core import LOGIC
 from emir_plant.plant import Plant, SimulationError
 from emir_plant.robot import actuators
 from emir_plant.robot.actuators import ACTUATORS, EACH, SIZE, SUPPLY, _valve_flows, own
@@ -197,6 +198,28 @@ def test_friction_of_a_joint_shows_in_its_pressure(place: str) -> None:
     x, y = PLANT.advance(x, lifting, 0.5), RobotPlant(sticky).advance(y, lifting, 0.5)
     more = y[1 + k * EACH] - x[1 + k * EACH]
     assert 0.0 < more < 2.0 * force / area
+
+
+def test_seals_of_a_joint_are_pressed_on_by_both_its_chambers() -> None:
+    """As the piston slides fast: mu (p_H A_H + p_S A_S), which the oil's force is not."""
+    seals = "joint3.effects.pressure_dependent_friction"
+    sealed = RobotPlant(
+        with_values(ROBOT, {f"{seals}.coefficient": 0.02, f"{seals}.seal_share": 1})
+    )
+    x, drives = PLANT.initial(BENT, 20e5), sealed.tables.drives
+    sliding, standing = np.empty(ACTUATORS), np.empty(ACTUATORS)
+    actuators.forces(x, np.full(ACTUATORS, 0.1), drives, sliding)
+    actuators.forces(x, np.zeros(ACTUATORS), drives, standing)
+    (high, low), p = own(x, 3)[:2], drives[3]
+    pressed = high * p["area_lifting"] + low * p["area_lowering"]
+    assert standing[3] - sliding[3] == pytest.approx(0.02 * pressed)
+
+
+def test_a_blocked_logic_block_rests_as_far_open_as_it_goes() -> None:
+    blocked = RobotPlant(with_values(ROBOT, {"main.effects.logic_block_fault.blocked": 0.6}))
+    start = blocked.initial(BENT, 20e5)
+    assert own(start, 1)[LOGIC] == pytest.approx(0.4)
+    assert own(blocked.derivative(start, SHUT), 1)[LOGIC] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import odeint
+from scipy.optimize import root
 
 from emir_analysis.blind.boom import boom
 from emir_analysis.blind.numbers import Numbers
@@ -25,8 +26,6 @@ RELATIVE = 1e-8  # accuracy of the integration
 ABSOLUTE = (1.0, 1.0, 1e-6, 1e-4, 1e-6)  # of the hydraulic states; Pa, Pa, 1, 1/s, 1
 ABSOLUTE_MODES = 1e-5  # sqrt(kg) m: 1e-8 rad of the joint
 ABSOLUTE_MEMORY = 1e-9
-SETTLING = 1000  # steps until a boom that bends by no straight law is at rest
-SETTLED_BY = 0.3  # of what a straight one would give way, in each of them
 AT_REST = 1e-9  # of the largest force on a mode
 
 
@@ -212,15 +211,17 @@ class Machine:
 
     def _bent(self, load: Array) -> Array:
         """Return the modes' positions, the rigid one 0, at rest under forces on each, (m,)."""
-        stiffness, still = self.boom.stiffness, np.zeros(load.size)
-        bent = still.copy()
-        bent[1:] = load[1:] / stiffness[1:]
-        for _ in range(SETTLING):
-            left = load + self.bending(bent, still)
-            if np.all(np.abs(left[1:]) <= AT_REST * np.abs(load).max()):
-                return bent
-            bent[1:] += SETTLED_BY * left[1:] / stiffness[1:]
-        raise NotSolvedError(f"{type(self).__name__}: the boom bends without end")
+        straight, still = load[1:] / self.boom.stiffness[1:], np.zeros(load.size)
+
+        def left(bent: Array) -> Array:
+            """Return what is left of the forces, in units of the largest."""
+            forces = load + self.bending(np.append(0.0, bent), still)
+            return np.asarray(forces[1:] / np.abs(load).max())
+
+        found = root(left, straight, tol=AT_REST)
+        if not np.all(np.abs(found.fun) <= AT_REST):
+            raise NotSolvedError(f"{type(self).__name__}: the boom bends without end")
+        return np.append(0.0, found.x)
 
     def rates(self, x: Array, time: float, command: float) -> Array:
         """Return dx/dt."""

@@ -18,6 +18,7 @@ from emir_analysis.blind.hidden import Hidden
 from emir_analysis.blind.machine import Array, Machine
 from emir_analysis.blind.numbers import DATA_SHEET, read_numbers
 from emir_analysis.blind.plan import foreign_effects
+from emir_analysis.blind.puzzle import ATTEMPTS, STRONGER
 from emir_analysis.blind.recording import Run, Start, repeated
 from emir_common.parameter_tree import with_values
 from emir_plant.boom import PointMass, boom_modes
@@ -347,3 +348,17 @@ def test_machines_with_foreign_effects_start_at_rest(file: str) -> None:
         assert np.all(still), effect.name
         leaks = any(machine.leaving(x[0], x[1]))
         assert leaks or np.all(rates[:2] == 0.0), effect.name
+
+
+def test_a_boom_that_is_much_bent_and_stiffens_starts_at_rest() -> None:
+    """Half as long again as EMIR's, and as stiff a law as the blind test may come to."""
+    source = (Path(__file__).parent / "foreign_more.py").read_text()
+    stiffening = next(e for e in foreign_effects(source, Hidden) if e.name == "stiffening_boom")
+    long = replace(STATED, boom_length=1.5 * STATED.boom_length, boom_mass=1.5 * STATED.boom_mass)
+    for stiffness in (1.0, STRONGER, STRONGER ** (ATTEMPTS - 1)):
+        machine = stiffening(long, {"stiffening": stiffness})
+        modes = machine.start(START.angle, START.p_s)[machine.modes]
+        bent = modes[: modes.size // 2]
+        forces = machine.bending(bent, np.zeros(bent.size)) - machine.weight(0.0, START.angle)
+        across = forces - machine.boom.joint * forces[0] / machine.boom.joint[0]
+        assert np.all(np.abs(across) < 1e-6 * np.abs(machine.boom.weight).max())

@@ -1,5 +1,6 @@
 """The models on recordings that no fit has seen: free runs, one step ahead, a black box beside."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from emir_analysis.diagnosis.foresight import explained
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.load_course import elsewhere, has_course
 from emir_analysis.diagnosis.loads import LOAD
-from emir_analysis.diagnosis.run_errors import free_run, free_run_errors
+from emir_analysis.diagnosis.run_errors import free_run, free_run_errors, mean_square
 from emir_analysis.diagnosis.select import EXPLAINED, HELPS, HOPELESS, at_noise, leaves_quiet
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import column_rms, rms
@@ -86,7 +87,7 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     chosen = there(findings, evidence)
     alone = loudest_signal(chosen.machine, evidence)[1]
     surprising = not explained(chosen, evidence) or alone > EXPLAINED
-    asked = findings.verdict in {"nothing_missing", "found"} and not sticks(chosen)
+    asked = findings.verdict != "unexplained" and not sticks(chosen)
     asked = asked and not has_course(findings.chosen)
     reconciled = asked and surprising and _reconciled(findings, evidence)
     return Judged(evidence, runs, one_step, surprising, reconciled)
@@ -95,15 +96,25 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
 def carries(findings: Findings, judged: Judged) -> bool:
     """Tell whether the effects found are the machine's, as far as the judge recordings know.
 
-    One that is takes away of what parameters alone leave in every recording, or leaves little, or
-    does so with other parameters. Not asked of what comes in one recording only, or of what sticks,
-    which may part from any model.
+    Those that are take away of what parameters alone leave in every recording, or leave little, or
+    do so with other parameters; of rivals it is enough that one does. Not asked of what comes in
+    one recording only, or of what sticks, which may part from any model.
     """
-    effects, off = findings.chosen.effects, judged.off(STAGES[-1])
-    if not effects or OF_ONE_RUN.intersection(effects) or sticks(findings.chosen):
+    named = [findings.chosen, *findings.rivals]
+    if judged.reconciled or any(_known_here_alone(trial) for trial in named):
         return True
-    surprised = off > HOPELESS and not judged.reconciled
-    return not (surprised and off >= HELPS * judged.off(REFITTED))  # NaN: it cannot rest there
+    off = [judged.off(STAGES[-1]), *(_off(rival, judged.evidence) for rival in findings.rivals)]
+    alone = judged.off(REFITTED)
+    return not all(left > HOPELESS and left >= HELPS * alone for left in off)  # NaN: no rest there
+
+
+def _known_here_alone(trial: Trial) -> bool:
+    """Tell whether other recordings say little of a trial."""
+    return not trial.effects or bool(OF_ONE_RUN.intersection(trial.effects)) or sticks(trial)
+
+
+def _off(rival: Trial, judge: Evidence) -> float:
+    return math.sqrt(mean_square(rival, judge))
 
 
 def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:

@@ -23,6 +23,7 @@ from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.root_mean_square import rms
 from emir_common.parameter_tree import declared
 
+NAMING = {"found", "ambiguous"}  # verdicts that name effects
 MANY = 0.1  # share of the samples
 ATMOSPHERE = 101325.0  # Pa
 ALIKE = 0.05  # relative
@@ -39,7 +40,7 @@ def verdict(findings: Findings, judged: Judged) -> str:
     surprised = judged.surprising and not judged.reconciled
     if findings.verdict == "nothing_missing" and surprised:
         return "unexplained"
-    if findings.verdict == "found" and not carries(findings, judged):
+    if findings.verdict in NAMING and not carries(findings, judged):
         return "unexplained"
     return findings.verdict
 
@@ -49,7 +50,7 @@ def statement(findings: Findings, judged: Judged) -> str:
     words = _of_findings(findings)
     if findings.verdict == "nothing_missing" and judged.surprising:
         words = f"of {findings.evidence.name}, {words}"
-    if findings.verdict == "found" and not carries(findings, judged):
+    if findings.verdict in NAMING and not carries(findings, judged):
         words = f"in {findings.evidence.name} alone explained by {words}"
     return words + judgement(findings, judged) + _stopped(findings)
 

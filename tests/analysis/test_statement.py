@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from emir_analysis.diagnosis import judged as judging
 from emir_analysis.diagnosis import judgement, statement
 from emir_analysis.diagnosis.balances import BALANCES
 from emir_analysis.diagnosis.curves import Curve
@@ -74,7 +75,7 @@ def test_a_recording_far_off_may_be_another_machine_s(
     learned = _recorded("a", [70.0, 200.0], [8.0, 60.0])
     findings = SimpleNamespace(
         verdict="nothing_missing", curve=None, misstated=(), evidence=learned,
-        chosen=SimpleNamespace(effects=(), machine=None),
+        chosen=SimpleNamespace(effects=(), machine=None), rivals=(),
     )  # fmt: skip
     judged = SimpleNamespace(
         surprising=True, reconciled=reconciled, off=lambda _: off,
@@ -94,11 +95,28 @@ def test_an_effect_carries_to_a_recording_where_it_helps(
     off: float, alone: float, *, carried: bool
 ) -> None:
     """Or leaves little; and one without which the machine cannot even rest there helps."""
-    findings = SimpleNamespace(chosen=SimpleNamespace(effects=("payload",)))
+    findings = SimpleNamespace(chosen=SimpleNamespace(effects=("payload",)), rivals=())
     judged = SimpleNamespace(
         reconciled=False, off={"with_effect": off, "refitted": alone}.__getitem__
     )
     assert carries(findings, judged) == carried
+
+
+@pytest.mark.parametrize(("of_rival", "verdict"), [(8.0, "unexplained"), (2.0, "ambiguous")])
+def test_rivals_are_named_where_one_of_them_carries_to_the_other_recording(
+    of_rival: float, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cracked boom: either of two sets did where it was learned, and none where it was judged."""
+    findings = SimpleNamespace(
+        verdict="ambiguous", chosen=SimpleNamespace(effects=("sensor_bias",)),
+        rivals=(SimpleNamespace(effects=("linkage_error",)),),
+    )  # fmt: skip
+    judged = SimpleNamespace(
+        surprising=True, reconciled=False, evidence=None,
+        off={"with_effect": 9.0, "refitted": 8.5}.__getitem__,
+    )  # fmt: skip
+    monkeypatch.setattr(judging, "mean_square", lambda *_: of_rival**2)
+    assert statement.verdict(findings, judged) == verdict
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,8 @@ def _beyond_threshold(measured: Array, p: Any) -> float:
 def _opened_by(opening: float, piloted: bool, time: float, p: Any) -> float:  # noqa: FBT001
     if piloted:
         settled = logic_block_fault.fully_open(p)
-        return settled - (settled - opening) * math.exp(-time / p.time_constant_opening)
+        left = math.exp(-time / logic_block_fault.time_constant_opening(p))
+        return settled - (settled - opening) * left
     return opening * math.exp(-time / logic_block_fault.time_constant_closing(p))
 
 

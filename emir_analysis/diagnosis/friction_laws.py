@@ -10,6 +10,8 @@ from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.unknowns import Unknown
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
+from emir_common.quantity import quantities
+from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
@@ -17,6 +19,9 @@ COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_f
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
 DAMPED, MOST_DAMPED = 1e-3, 0.05  # s, by their damping: where a fit begins, and the most
+UNEVEN = 0.2  # share by which friction differs with the direction, about
+LEAST_VISCOUS = 1.0  # N s/m, for a scale where there is none
+FAST = 0.1  # m/s, at which what grows with the square may be as much as what grows with speed
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 
@@ -80,6 +85,34 @@ def along_the_way(known: Trial) -> Trial:
     return known
 
 
+def uneven(known: Trial) -> Trial:
+    """Return a trial whose dry friction may differ with the direction of motion.
+
+    Of several the first: how two differ is as hard to tell apart as their sizes.
+    """
+    dry = _dry(known)
+    return known if is_uneven(known) or not dry else _uneven(known, dry[0])
+
+
+def _uneven(known: Trial, name: str) -> Trial:
+    about = quantities(REGISTRY[name])["asymmetry"]
+    low, high = about.low / UNEVEN, about.high / UNEVEN
+    return known.also(Unknown(_asymmetry(name), "1", 0.0, UNEVEN, low, high, 0.0, False))
+
+
+def even(known: Trial) -> Trial:
+    """Return a trial whose dry friction is the same in both directions."""
+    for name in _dry(known):
+        known = known.fixed(_asymmetry(name), 0.0)
+    return known
+
+
+def is_uneven(known: Trial) -> bool:
+    """Tell whether a trial's dry friction may differ with the direction."""
+    paths = {unknown.path for unknown in known.unknowns.members}
+    return any(_asymmetry(name) in paths for name in _dry(known))
+
+
 def is_along_the_way(known: Trial) -> bool:
     """Tell whether a trial's dry friction comes along the way."""
     return any(getattr(known.machine.effects, name).presliding for name in _dry(known))
@@ -96,8 +129,8 @@ def _dry(known: Trial) -> list[str]:
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:
-    """Return trials with less friction: without the viscous one, without a break-away."""
-    found = []
+    """Return trials with less friction: an even one, without the viscous one or a break-away."""
+    found = [even(full)] if is_uneven(full) else []
     if VISCOUS in full.effects:
         found.append(full.without(VISCOUS))
     if STRIBECK in full.effects:
@@ -120,6 +153,19 @@ def viscous_is_heard(known: Trial, evidence: Evidence, floor: Array) -> bool:
     return known.machine.effects.viscous_friction.coefficient * fastest >= float(floor[FORCE])
 
 
+def with_square(known: Trial) -> Trial | None:
+    """Return a trial whose viscous friction may grow with the square of the speed, too.
+
+    None without one, or where it may already.
+    """
+    path = f"effects.{VISCOUS}.square"
+    if VISCOUS not in known.effects or path in known.unknowns.values(known.x):
+        return None
+    about = quantities(REGISTRY[VISCOUS])["square"]
+    scale = max(known.machine.effects.viscous_friction.coefficient, LEAST_VISCOUS) / FAST
+    return known.also(Unknown(path, about.unit, 0.0, scale, 0.0, about.high / scale, 0.0, False))
+
+
 def breakaway_may_be_none(known: Trial) -> bool:
     """Tell whether Stribeck's friction may be Coulomb's, by the curvature of a trial's fit."""
     for unknown, x, spread in zip(known.unknowns.members, known.x, known.spread, strict=True):
@@ -135,6 +181,8 @@ def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
     found = found.fixed(_share(COULOMB), full.machine.effects.stribeck_friction.gradual_share)
     if is_along_the_way(full):
         found = along_the_way(found)
+    if _asymmetry(STRIBECK) in values:
+        found = _uneven(found, COULOMB)
     x = found.x.copy()
     for k, unknown in enumerate(found.unknowns.members):
         if unknown.path.startswith(f"effects.{COULOMB}."):
@@ -144,3 +192,7 @@ def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
 
 def _share(effect: str) -> str:
     return f"effects.{effect}.gradual_share"
+
+
+def _asymmetry(effect: str) -> str:
+    return f"effects.{effect}.asymmetry"

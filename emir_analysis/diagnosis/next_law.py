@@ -24,6 +24,8 @@ from emir_analysis.diagnosis.friction_laws import (
     gradual,
     is_along_the_way,
     is_gradual,
+    is_uneven,
+    uneven,
 )
 from emir_analysis.diagnosis.screening import screen_free_run
 from emir_analysis.diagnosis.select import LEFT
@@ -88,9 +90,11 @@ def _best(found: Sequence[Laws], begins: Sequence[Evidence], most: float) -> Fit
 
 
 def _other_laws(laws: Laws, evidence: Evidence) -> list[Laws]:
-    """Return fuller laws, and the same one come gradually, where it comes by tanh."""
+    """Return fuller laws, the same one come gradually, where it comes by tanh, and uneven."""
     law, fuller = laws
     found = _fuller(laws)
+    if not is_uneven(law):
+        found.append(Laws(uneven(law), [uneven(more) for more in fuller]))
     if not is_along_the_way(law) and not is_gradual(law):
         found.append(Laws(gradually(law, evidence), [gradual(more) for more in fuller]))
     return found

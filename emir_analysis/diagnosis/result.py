@@ -280,13 +280,13 @@ def effect_results(
             found.append(EffectResult(name, kind.balance, _of_course(chosen, fitted)))
             continue
         effect = getattr(chosen.machine.effects, name)
-        usual = quantities(kind).keys() - {*kind.sizes, *kind.other_law}
+        usual = quantities(kind).keys() - {*kind.sizes, *kind.other_law, *kind.given}
         parameters = {}
         for parameter, about in quantities(kind).items():
             path = f"effects.{name}.{parameter}"
             if path in fitted:
                 parameters[parameter] = replace(fitted[path], meaning=about.meaning)
-            elif parameter in usual or getattr(effect, parameter) != 0.0:
+            elif path in chosen.form or parameter in usual or getattr(effect, parameter) != 0.0:
                 value = float(getattr(effect, parameter))
                 low, high, note = value, value, SET
                 if path in chosen.form:

@@ -15,7 +15,9 @@ from emir_analysis.diagnosis.friction_laws import (
     is_along_the_way,
     is_gradual,
     sticks,
+    uneven,
     viscous_is_heard,
+    with_square,
     without_breakaway,
 )
 from emir_analysis.diagnosis.late_command import late_command
@@ -41,6 +43,7 @@ from emir_plant.effects import REGISTRY
 from emir_plant.effects.payload import Payload
 from emir_plant.sheet import Sheet
 
+STEADY = {"sensor_bias", LOAD}  # beside friction as one that differs with the direction
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
 # in 99 of 100 recordings
 
@@ -68,6 +71,7 @@ class Whole:
                     fitted = self._led_again(fitted)
                 else:
                     fitted = self._with_other_shares(self._refined_again(fitted))
+                    fitted = self._with_square(fitted)
             fitted = self._with_payload_elsewhere(fitted)
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
@@ -187,6 +191,14 @@ class Whole:
         found = refine_free_run(begun, self._evidence)
         return found if self._excess(found) < MOST * self._excess(fitted) else fitted
 
+    def _with_square(self, fitted: Trial) -> Trial:
+        """Return a trial whose viscous friction grows faster, where that takes most away."""
+        begun = with_square(fitted)
+        if begun is None or self._excess(fitted) <= beyond(LEFT):
+            return fitted
+        found = refine_free_run(begun, self._evidence)
+        return found if self._excess(found) < MOST * self._excess(fitted) else fitted
+
     def _with_simple_load(self, fitted: Trial) -> Trial:
         """Return a trial whose load from outside is steady or does not decay, if that is as good.
 
@@ -216,7 +228,7 @@ class Whole:
         in place of sensors that are all equally late, or with what is usual for a form or a share.
         Two sizes together may lead to where neither is right, such as a negative compliance.
         """
-        fitted = self._with_late_command(fitted)
+        fitted = self._with_uneven_friction(self._with_late_command(fitted))
         if not sticks(fitted):
             if _sizes(fitted) not in self._with_fewest:
                 fitted = self._with_fewer_sizes(fitted)
@@ -263,6 +275,15 @@ class Whole:
             return fitted
         late = refine_free_run(begun, self._evidence, fitted)
         return late if self.score(late) <= self.score(fitted) else fitted
+
+    def _with_uneven_friction(self, fitted: Trial) -> Trial:
+        """Return a trial with uneven friction for a steady force beside an even one, if as good."""
+        for effect in STEADY.intersection(fitted.effects if sticks(fitted) else ()):
+            begun = refine_free_run(uneven(fitted.without(effect)), self._evidence)
+            found = self._led_again(begun)
+            if self.score(found) <= self.score(fitted):
+                return found
+        return fitted
 
     def keep(self, fitted: Trial) -> None:
         """Take a trial as the one that is fitted with its effects."""

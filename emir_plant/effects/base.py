@@ -21,7 +21,7 @@ class Effect:
         goes through them in steps of their trial values.
     none_or_above: values of fields below which they count as none.
     other_law: fields that give the effect another law where they are not 0; a search begins at 0.
-    given: fields that say what the others mean, and are not searched.
+    given: fields that say what the others mean, and are not searched from the start.
     forms: values of given fields that make another effect of it; a search tries one by one.
     is_series: each size is worth little without those before it, as a polynomial's higher terms.
     """

@@ -10,20 +10,22 @@ from emir_plant.jit import compiled
 
 @dataclass(frozen=True)
 class LogicBlockFault(Effect):
-    """Threshold, pilot or closing time off, or a poppet that does not open all the way.
+    """Threshold, pilot or times off, or a poppet that does not open all the way.
 
-    p_threshold + threshold; T_closing (1 + closing); a pilot pressure mixed with a share of
-    the other chamber's (a leaking pilot line); and y4 goes to 1 - blocked in place of 1.
+    p_threshold + threshold; T_closing (1 + closing); T_opening (1 + opening); a pilot pressure
+    mixed with a share of the other chamber's (a leaking pilot line); and y4 goes to 1 - blocked in
+    place of 1.
     """
 
     balance: ClassVar[Balance] = "logic block"
-    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "pilot", "blocked")
+    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "opening", "pilot", "blocked")
     source: ClassVar[str] = (
         "spring setting, a sticking or blocked pilot, dirt; magnitudes of a maladjusted valve"
     )
     trial: ClassVar[dict[str, float]] = {
         "threshold": 5e5,
         "closing": 0.5,
+        "opening": 2.0,
         "pilot": 0.1,
         "blocked": 0.3,
     }
@@ -32,6 +34,7 @@ class LogicBlockFault(Effect):
 
     threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
     closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)
+    opening: float = quantity("1", -0.9, 50.0, "relative error of the opening time", default=0.0)
     pilot: float = quantity("1", 0.0, 1.0, "share of the other chamber's pressure", default=0.0)
     blocked: float = quantity("1", 0.0, 0.95, "share of the opening that is missing", default=0.0)
 
@@ -46,6 +49,12 @@ def threshold(p: Any) -> float:
 def time_constant_closing(p: Any) -> float:
     """Return the closing time constant as it is, s."""
     return p.time_constant_closing * (1.0 + p.logic_block_fault_closing)
+
+
+@compiled
+def time_constant_opening(p: Any) -> float:
+    """Return the opening time constant as it is, s."""
+    return p.time_constant_opening * (1.0 + p.logic_block_fault_opening)
 
 
 @compiled

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
-from emir_plant.effects.smooth_sign import smooth_sign
+from emir_plant.effects.smooth_sign import smooth_sign, uneven
 from emir_plant.jit import compiled
 
 
@@ -15,8 +15,8 @@ class PressureDependentFriction(Effect):
 
     For seal_share of it p_H A_H + p_S A_S in place of the difference: bearings carry what the oil
     pushes, seals are pressed on each by the pressure of its own chamber. For gradual_share of it
-    v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0). With presliding it comes along the way
-    instead, see `emir_plant.bristles`.
+    v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0). Lifting 1 + asymmetry times as much, lowering
+    1 - asymmetry. With presliding it comes along the way instead, see `emir_plant.bristles`.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -27,12 +27,16 @@ class PressureDependentFriction(Effect):
         "gradual_share": 0.5,
         "seal_share": 0.5,
     }
+    given: ClassVar[tuple[str, ...]] = ("asymmetry",)
     other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
 
     coefficient: float = quantity("1", 0.0, 0.2, "mu", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=2e-3)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
     seal_share: float = quantity("1", 0.0, 1.0, "of seals, on p_H A_H + p_S A_S", default=0.0)
+    asymmetry: float = quantity(
+        "1", -0.5, 0.5, "share by which it is more lifting, less lowering", default=0.0
+    )
     presliding: float = quantity(
         "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
     )
@@ -54,4 +58,5 @@ def friction(velocity: float, pressing: float, p: Any) -> float:
         return 0.0
     level = p.pressure_dependent_friction_coefficient * abs(pressing)
     number = velocity / p.pressure_dependent_friction_smoothing_speed
-    return level * smooth_sign(number, p.pressure_dependent_friction_gradual_share)
+    sign = smooth_sign(number, p.pressure_dependent_friction_gradual_share)
+    return level * uneven(sign, p.pressure_dependent_friction_asymmetry)

@@ -18,6 +18,22 @@ def smooth_sign(number: float, gradual: float) -> float:
 
 
 @compiled
+def uneven(sign: float, asymmetry: float) -> float:
+    """Return a smoothed sign larger by a share where it is positive, smaller where negative.
+
+    Up to a share of a half it grows with the velocity throughout: what creeps never holds more
+    than what slides.
+    """
+    return sign * (1.0 + asymmetry * sign)
+
+
+@compiled
+def by_direction(velocity: float, asymmetry: float) -> float:
+    """Return the same without a sign, while it slides."""
+    return 1.0 + asymmetry if velocity >= 0.0 else 1.0 - asymmetry
+
+
+@compiled
 def slope(number: float, gradual: float) -> float:
     """Return the slope of `smooth_sign` over its number."""
     steep = 1.0 - _tanh(number) ** 2

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from emir_common.quantity import quantity
 from emir_plant.effects.base import Balance, Effect
-from emir_plant.effects.smooth_sign import smooth_sign
+from emir_plant.effects.smooth_sign import smooth_sign, uneven
 from emir_plant.jit import compiled
 
 
@@ -14,8 +14,9 @@ from emir_plant.jit import compiled
 class StribeckFriction(Effect):
     """Force against the motion: tanh(v/v_0) F_c [1 + (b - 1) exp(-(v/v_s)^2)].
 
-    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0). With
-    presliding it comes along the way instead, see `emir_plant.bristles`.
+    For gradual_share of it v / sqrt(v^2 + v_0^2) in place of tanh(v / v_0). Lifting 1 + asymmetry
+    times as much, lowering 1 - asymmetry. With presliding it comes along the way instead, see
+    `emir_plant.bristles`.
     """
 
     balance: ClassVar[Balance] = "force"
@@ -27,6 +28,7 @@ class StribeckFriction(Effect):
         "stribeck_speed": 7e-3,
         "gradual_share": 0.5,
     }
+    given: ClassVar[tuple[str, ...]] = ("asymmetry",)
     other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
 
     force: float = quantity("N", 0.0, 1e5, "F_c, while sliding fast", default=0.0)
@@ -34,6 +36,9 @@ class StribeckFriction(Effect):
     stribeck_speed: float = quantity("m/s", 1e-4, 0.2, "v_s", default=7e-3)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
     gradual_share: float = quantity("1", 0.0, 1.0, "of v/sqrt(v^2 + v_0^2)", default=0.0)
+    asymmetry: float = quantity(
+        "1", -0.5, 0.5, "share by which it is more lifting, less lowering", default=0.0
+    )
     presliding: float = quantity(
         "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
     )
@@ -46,7 +51,8 @@ def friction(velocity: float, p: Any) -> float:
     if p.stribeck_friction_force == 0.0:
         return 0.0
     number = velocity / p.stribeck_friction_smoothing_speed
-    return level(velocity, p) * smooth_sign(number, p.stribeck_friction_gradual_share)
+    sign = smooth_sign(number, p.stribeck_friction_gradual_share)
+    return level(velocity, p) * uneven(sign, p.stribeck_friction_asymmetry)
 
 
 @compiled

@@ -20,6 +20,7 @@ from emir_plant.effects import (
     vessel_compliance,
     viscous_friction,
 )
+from emir_plant.effects.smooth_sign import by_direction
 from emir_plant.hydraulics.flows import Edges
 from emir_plant.jit import compiled
 from emir_plant.unnamed import compliance as unnamed_compliance
@@ -85,9 +86,11 @@ def bristles(velocity: float, pressing: float, p: Any) -> Bristles:
     damping = coulomb * p.coulomb_friction_presliding_time
     damping += stribeck * p.stribeck_friction_presliding_time
     damping += by_load * p.pressure_dependent_friction_presliding_time
-    sliding = p.coulomb_friction_force + pressed
+    sliding = p.coulomb_friction_force * by_direction(velocity, p.coulomb_friction_asymmetry)
+    sliding += pressed * by_direction(velocity, p.pressure_dependent_friction_asymmetry)
     if p.stribeck_friction_force > 0.0:
-        sliding += stribeck_friction.level(velocity, p)
+        level = stribeck_friction.level(velocity, p)
+        sliding += level * by_direction(velocity, p.stribeck_friction_asymmetry)
     return Bristles(sliding, coulomb + stribeck + by_load, damping)
 
 

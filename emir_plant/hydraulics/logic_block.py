@@ -27,7 +27,8 @@ def opening_rate(opening: float, pilot_pressure: float, p: Any) -> float:
     To less than 1 where something is in its way.
     """
     if is_piloted(pilot_pressure, p):
-        return (logic_block_fault.fully_open(p) - opening) / p.time_constant_opening
+        missing = logic_block_fault.fully_open(p) - opening
+        return missing / logic_block_fault.time_constant_opening(p)
     return -opening / logic_block_fault.time_constant_closing(p)
 
 

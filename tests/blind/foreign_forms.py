@@ -17,6 +17,7 @@ from emir_analysis.blind.hidden import (
     boom_mass,
     either_sign,
     lifting_force,
+    nominal_speed,
 )
 from emir_analysis.blind.machine import HYDRAULIC, Array, Sizes
 from emir_analysis.blind.numbers import Numbers
@@ -311,6 +312,22 @@ class BlockedPoppet(Hidden):
         return max(1.0 - self.sizes["in_the_way"], 0.05)
 
 
+class SlowToOpen(Hidden):
+    """A logic block whose pilot line is narrow: it opens late."""
+
+    name = "logic_block_fault~slow to open"
+    grows = ("opens_in",)
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"opens_in": between(random, 0.3, 1.0)}
+
+    def logic_rate(self, opened: float, pilot: float) -> float:
+        if pilot > self.n.threshold:
+            return (1.0 - opened) / self.sizes["opens_in"]
+        return super().logic_rate(opened, pilot)
+
+
 class OtherOil(Hidden):
     """Oil softer or stiffer than stated, beyond what the maker allows for, in one chamber or both.
 
@@ -554,6 +571,52 @@ class PressedSeals(Hidden):
         return super().accelerations(x, time, angle, push - self.sizes["seals_rub"] * pressed * dry)
 
 
+class UnevenSeals(Hidden):
+    """Dry friction of two lips, of which one scrapes as the rod goes out, the other as it comes."""
+
+    name = "coulomb_friction~uneven"
+    grows = ("scrapes_out", "scrapes_in")
+    scales: ClassVar[dict[str, Scale]] = {
+        "scrapes_out": lifting_force,
+        "scrapes_in": lifting_force,
+    }
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        smaller, ratio = between(random, 4e3, 1.2e4), between(random, 1.4, 2.2)
+        out = random.uniform() < 0.5
+        return {
+            "scrapes_out": smaller * (ratio if out else 1.0),
+            "scrapes_in": smaller * (1.0 if out else ratio),
+            "scrapes_from": between(random, 2e-4, 2e-3),
+        }
+
+    def resistance(self, velocity: float, force: float, stroke: float) -> float:
+        s = self.sizes
+        moving = velocity / math.hypot(velocity, s["scrapes_from"])
+        lip = s["scrapes_out"] if velocity > 0.0 else s["scrapes_in"]
+        return super().resistance(velocity, force, stroke) + lip * moving
+
+
+class NarrowGap(Hidden):
+    """Friction that grows faster than the speed: oil is pushed through what is narrow."""
+
+    name = "viscous_friction~square"
+    grows = ("film", "gap")
+    scales: ClassVar[dict[str, Scale]] = {
+        "film": lambda n: lifting_force(n) / nominal_speed(n),
+        "gap": lambda n: lifting_force(n) / nominal_speed(n) ** 2,
+    }
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"film": between(random, 2e4, 2e5), "gap": between(random, 1e6, 1e7)}
+
+    def resistance(self, velocity: float, force: float, stroke: float) -> float:
+        oil = (self.sizes["film"] + self.sizes["gap"] * abs(velocity)) * velocity
+        return super().resistance(velocity, force, stroke) + oil
+
+
 FOREIGN: tuple[type[Hidden], ...] = (
     TurbulentLeak,
     TurbulentDrip,
@@ -569,6 +632,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     SwingAboutMean,
     LoadElsewhere,
     BlockedPoppet,
+    SlowToOpen,
     OtherOil,
     SameSlope,
     OneEdge,
@@ -578,4 +642,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     StribeckOnBristles,
     LoadOnBristles,
     PressedSeals,
+    UnevenSeals,
+    NarrowGap,
 )

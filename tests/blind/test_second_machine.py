@@ -2,7 +2,9 @@
 
 import ast
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -45,6 +47,14 @@ def moves(seconds: float) -> Array:
     command[time > 0.3 * seconds] = 0.0
     command[time > 0.4 * seconds] = -0.9
     command[time > 0.75 * seconds] = 0.3
+    return command
+
+
+def jerks(seconds: float) -> Array:
+    """Return down hard and less so in turn: the logic block shuts and opens again on the way."""
+    time = np.arange(0.0, seconds, STATED.command_period)
+    command = np.where(time % 1.0 < 0.5, -1.0, -0.5)
+    command[time < 1.0] = 0.5
     return command
 
 
@@ -234,6 +244,10 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"mass": 300.0, "place": 0.72},
     ),
     _OTHER["logic_block_fault~blocked"]: ({"in_the_way": 0.6}, {"blocked": 0.6}),
+    _OTHER["logic_block_fault~slow to open"]: (
+        {"opens_in": 0.8},
+        {"opening": 0.8 / STATED.time_constant_opening - 1.0},
+    ),
     _OTHER["vessel_compliance~beta"]: (
         {"softer": -0.3, "where": 1.0},
         {"lowering": -0.3 * STATED.volume_lowering_0 / STATED.beta, "wall_share": 1.0},
@@ -280,24 +294,31 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"seals_rub": 0.03, "rubs_from": 1e-3},
         {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0, "seal_share": 1.0},
     ),
+    _OTHER["coulomb_friction~uneven"]: (
+        {"scrapes_out": 8e3, "scrapes_in": 1.6e4, "scrapes_from": 3e-4},
+        {"force": 1.2e4, "smoothing_speed": 3e-4, "gradual_share": 1.0, "asymmetry": -1.0 / 3.0},
+    ),
+    _OTHER["viscous_friction~square"]: (
+        {"film": 5e4, "gap": 4e6},
+        {"coefficient": 5e4, "square": 4e6},
+    ),
 }
 
 
-@pytest.fixture(scope="module")
-def healthy() -> dict[str, Array]:
-    """The project's machine without effects."""
-    return of_plant({}, moves(5.0))
+@cache
+def healthy(moved: Callable[[float], Array]) -> dict[str, Array]:
+    """Return what the sensors of the project's machine without effects show over some moves."""
+    return of_plant({}, moved(5.0))
 
 
 @pytest.mark.parametrize("kind", SAME | FORMS, ids=lambda kind: kind.name)
-def test_an_effect_written_twice_does_the_same(
-    kind: type[Hidden], healthy: dict[str, Array]
-) -> None:
-    commands = moves(5.0)
+def test_an_effect_written_twice_does_the_same(kind: type[Hidden]) -> None:
+    moved = jerks if kind.name == "logic_block_fault~slow to open" else moves
+    commands = moved(5.0)
     here, there = (SAME | FORMS)[kind]
     name = kind.name.split("~")[0]
     run = repeated(kind(STATED, here), START, commands)
-    made = apart(run, healthy)
+    made = apart(run, healthy(moved))
     error = apart(run, of_plant({f"{name}.{k}": v for k, v in there.items()}, commands))
     loudest = max(SIGNALS, key=lambda name: made[name] / SIGNALS[name])
     assert made[loudest] > 10.0 * SIGNALS[loudest]  # else nothing is compared

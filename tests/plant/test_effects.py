@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from emir_common.parameter_tree import with_values
 from emir_common.quantity import ParameterError, quantities
-from emir_plant import core, integration, linkage
+from emir_plant import core, dry_friction, integration, linkage
 from emir_plant.core import Truth
 from emir_plant.effects import (
     REGISTRY,
@@ -260,6 +260,51 @@ def test_viscous_friction_is_proportional_to_the_speed() -> None:
     p = _with(viscous_friction={"coefficient": 1e5}).record[0]
     assert terms.friction(0.025, 6e5, p) == pytest.approx(2.5e3)
     assert terms.friction(-0.05, 6e5, p) == pytest.approx(-5e3)
+
+
+def test_oil_pushed_through_what_is_narrow_resists_by_the_square_of_the_speed() -> None:
+    p = _with(viscous_friction={"coefficient": 1e5, "square": 2e6}).record[0]
+    assert terms.friction(0.05, 6e5, p) == pytest.approx(5e3 + 5e3)
+    assert terms.friction(-0.1, 6e5, p) == pytest.approx(-(10e3 + 20e3))
+
+
+DRY_SIZES = {
+    "coulomb_friction": {"force": 1e4},
+    "stribeck_friction": {"force": 1e4},
+    "pressure_dependent_friction": {"coefficient": 1e4 / 6e5},
+}
+
+
+@pytest.mark.parametrize("gradual", [0.0, 1.0])
+@pytest.mark.parametrize("name", DRY_SIZES)
+def test_dry_friction_may_be_larger_in_one_direction(name: str, gradual: float) -> None:
+    """And however much, what is slower never meets more of it than what creeps beside it."""
+    sizes = {**DRY_SIZES[name], "asymmetry": -0.5, "gradual_share": gradual}
+    if name == "stribeck_friction":
+        sizes["breakaway"] = 1.0
+    p = _with(**{name: sizes}).record[0]
+    assert terms.friction(1.0, 6e5, p) == pytest.approx(5e3, rel=1e-4)
+    assert terms.friction(-1.0, 6e5, p) == pytest.approx(-15e3, rel=1e-4)
+    velocities = np.linspace(-0.01, 0.01, 401)
+    assert np.all(np.diff([terms.friction(v, 6e5, p) for v in velocities]) > -1e-6)
+
+
+@pytest.mark.parametrize("name", DRY_SIZES)
+def test_seals_that_give_slide_at_more_in_one_direction(name: str) -> None:
+    sizes = {**DRY_SIZES[name], "asymmetry": 0.3, "presliding": 1e-4}
+    p = _with(**{name: sizes}).record[0]
+    assert terms.bristles(1.0, 6e5, p).sliding == pytest.approx(13e3)
+    assert terms.bristles(-1.0, 6e5, p).sliding == pytest.approx(7e3)
+
+
+@pytest.mark.parametrize("lifted", [1.0, -1.0])
+def test_a_piston_is_held_by_more_in_one_direction(lifted: float) -> None:
+    """Pushed with 1.2 of 1.3 or of 0.7 times the friction, the piston stands or goes."""
+    p = _with(coulomb_friction={"force": 1e4, "smoothing_speed": 1e-5, "asymmetry": 0.3}).record[0]
+    at = terms.Situation(6e5, 0.0)
+    pushed = lifted * 1.2e4 * 1e-6  # m/s, that the push makes in a step
+    left = pushed - 1e-6 * dry_friction.at_end(pushed, 1e-6, at, p)
+    assert abs(left) == pytest.approx(0.0 if lifted > 0.0 else 5e-3, abs=5e-5)
 
 
 def test_pressure_dependent_friction_is_a_share_of_the_load_and_smooth_at_rest() -> None:
@@ -815,6 +860,13 @@ def test_fault_of_the_logic_block_changes_threshold_closing_and_pilot() -> None:
     assert logic_block_fault.time_constant_closing(p) == pytest.approx(2.0 * 0.3)
     assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.6)
     assert logic_block.pilot_pressure(100e5, 20e5, p) == pytest.approx(80e5)
+
+
+def test_a_narrow_pilot_line_opens_the_logic_block_late() -> None:
+    p = _with(logic_block_fault={"opening": 9.0}).record[0]
+    slow = 10.0 * MACHINE.logic_block.time_constant_opening
+    assert logic_block.opening_rate(0.0, 120e5, p) == pytest.approx(1.0 / slow)
+    assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.3)  # shuts as stated
 
 
 def test_a_blocked_poppet_opens_as_far_as_it_can_and_throttles_what_leaves() -> None:

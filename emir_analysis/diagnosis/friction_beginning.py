@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.friction_laws import (
     is_along_the_way,
     is_gradual,
     simpler,
+    uneven,
     viscous_is_heard,
     with_sharper_friction,
 )
@@ -66,14 +67,15 @@ def begun(start: Trial, evidence: Evidence, floor: Array, most: float = OFF) -> 
     Over the first beginning it is fitted from those shapes of the friction near standstill whose
     free run is best there, and from each minimum with friction that comes gradually, too. The best
     fits are led on, fewer each time: it takes some sticks to tell two minima apart. Where that
-    leaves more than LEFT_EARLY, it is begun with friction that comes along the way, too. None where
-    more than `most` is left: that is no matter of how friction begins. floor: (5,) what the sensors
-    leave in each balance.
+    leaves more than LEFT_EARLY, it is begun with friction that comes along the way, too, and with
+    one that differs with the direction. None where more than `most` is left: that is no matter of
+    how friction begins. floor: (5,) what the sensors leave in each balance.
     """
     first = best = _begun(start, evidence, floor)
-    if best.law.misfit > LEFT_EARLY:
-        found = _begun(along_the_way(start), evidence, floor, first.left)
-        best = min(best, found, key=lambda each: each.law.misfit)
+    for other in (along_the_way(start), uneven(start)):
+        if best.law.misfit > LEFT_EARLY:
+            found = _begun(other, evidence, floor, first.left)
+            best = min(best, found, key=lambda each: each.law.misfit)
     return best.law.trial if best.law.misfit <= most else None
 
 

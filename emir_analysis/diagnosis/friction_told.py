@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.friction_beginning import begun, with_less_friction
-from emir_analysis.diagnosis.friction_laws import fullest, uneven
+from emir_analysis.diagnosis.friction_laws import fullest
 from emir_analysis.diagnosis.rounds import Rounds
 from emir_analysis.diagnosis.select import LEFT, STRONG, at_noise, beyond, excess, free_run_score
 from emir_analysis.diagnosis.stick_slip import OFF
@@ -67,7 +67,6 @@ class FrictionTold:
         self._begun.add(start.effects)
         self._progress(f"friction by a growing beginning: {known.name}")
         law = begun(start, self._evidence, self._floor, most)
-        law = law or begun(uneven(start), self._evidence, self._floor, most)
         if law is None:
             return None
         law, *fuller = with_less_friction(law, self._evidence, self._sheet, self._floor)

@@ -10,7 +10,14 @@ from emir_analysis.diagnosis.experiment import COMMAND_STEP
 from emir_analysis.diagnosis.fitting import glimpsed
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
-from emir_analysis.diagnosis.select import EXPLAINED, STRONG, beyond, excess, free_run_score
+from emir_analysis.diagnosis.resized import resized
+from emir_analysis.diagnosis.select import (
+    HOPELESS,
+    STRONG,
+    beyond,
+    excess,
+    free_run_score,
+)
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.root_mean_square import rms
@@ -72,8 +79,8 @@ def untold(evidence: Evidence) -> dict[str, str]:
 def open_shares(chosen: Trial, evidence: Evidence) -> dict[str, Trial]:
     """Return the trials at the other end of shares that were set, where they are as good.
 
-    By the share's dotted path. The other parameters move with it where it explains nearly as well
-    without, but for what sticks: a step of the resolver decides there.
+    By the share's dotted path. Of the size that suits it there, and the other parameters move with
+    it where it is not far off, but for what sticks: a step of the resolver decides there.
     """
     fitted = {unknown.path for unknown in chosen.unknowns.members}
     good = free_run_score(chosen, evidence, seen=0.0) + STRONG
@@ -82,14 +89,17 @@ def open_shares(chosen: Trial, evidence: Evidence) -> dict[str, Trial]:
         named = path.startswith(tuple(f"effects.{effect}." for effect in chosen.effects))
         if named and path not in fitted and is_share(path):
             other = chosen.fixed(path, 1.0 - value)
-            score = free_run_score(other, evidence, seen=0.0)
-            near = score >= good and excess(other, evidence) < beyond(EXPLAINED)
-            if near and not sticks(chosen):
-                other = glimpsed(other, evidence)
-                score = free_run_score(other, evidence, seen=0.0)
-            if score < good:
+            if free_run_score(other, evidence, seen=0.0) >= good and not sticks(chosen):
+                other = _elsewhere(resized(other, path, evidence), evidence)
+            if free_run_score(other, evidence, seen=0.0) < good:
                 found[path] = other
     return found
+
+
+def _elsewhere(other: Trial, evidence: Evidence) -> Trial:
+    """Return a trial with the other parameters moved, where it is not far off."""
+    near = excess(other, evidence) < beyond(HOPELESS)
+    return glimpsed(other, evidence) if near else other
 
 
 def between_steps(chosen: Trial, k: int, evidence: Evidence) -> tuple[float, float]:

@@ -376,6 +376,53 @@ def test_a_poppet_that_does_not_open_all_the_way_is_found() -> None:
     assert fitted["effects.logic_block_fault.blocked"] == pytest.approx(0.6, abs=0.03)
 
 
+def test_a_logic_block_that_opens_late_is_found() -> None:
+    """Its spring is too strong besides, so that it shuts and opens again on the way down."""
+    stated = joint1()
+    jerks = [-1.0] * 12 + [-0.4] * 16
+    command = [0.0] * 40 + ([0.4] * 60 + [0.0] * 30 + jerks * 3 + [0.0] * 30) * 6
+    path = "effects.logic_block_fault"
+    late = with_values(stated, {f"{path}.threshold": 60e5, f"{path}.opening": 29.0})
+    run = operated(late, np.array(command), angle=1.1)
+    searched = Search(Evidence([run], stated), Sheet(stated, TOLERANCES, {}, ()), lambda _: None)
+    found = searched.named(searched.run()[0])
+    assert found.effects == ("logic_block_fault",)
+    fault = found.machine.effects.logic_block_fault
+    assert fault.threshold == pytest.approx(60e5, rel=0.01)
+    assert fault.opening == pytest.approx(29.0, rel=0.05)
+    assert fault.closing == pytest.approx(0.0, abs=0.02)
+
+
+def test_friction_that_grows_faster_than_the_speed_is_found() -> None:
+    path = "effects.viscous_friction"
+    found = diagnosed({f"{path}.coefficient": 1e5, f"{path}.square": 3e6})
+    assert found.effects == ("viscous_friction",)
+    friction = found.machine.effects.viscous_friction
+    assert friction.coefficient == pytest.approx(1e5, rel=0.04)
+    assert friction.square == pytest.approx(3e6, rel=0.04)
+
+
+@pytest.mark.parametrize(
+    ("name", "asymmetry"), [("coulomb_friction", -0.3), ("stribeck_friction", 0.25)]
+)
+def test_friction_that_differs_with_the_direction_is_found(name: str, asymmetry: float) -> None:
+    found = diagnosed({f"effects.{name}.force": 9.5e3, f"effects.{name}.asymmetry": asymmetry})
+    assert found.effects == (name,)
+    friction = getattr(found.machine.effects, name)
+    assert friction.force == pytest.approx(9.5e3, rel=0.03)
+    assert friction.asymmetry == pytest.approx(asymmetry, abs=0.02)
+
+
+def test_a_gauge_that_is_off_beside_friction_is_no_friction_that_differs_with_the_direction() -> (
+    None
+):
+    """While it moves one way or the other they are the same; at rest before the first they part."""
+    bias = "effects.sensor_bias.pressure_lifting"
+    found = diagnosed({"effects.coulomb_friction.force": 9.5e3, bias: 1e5})
+    assert set(found.effects) == {"coulomb_friction", "sensor_bias"}
+    assert found.unknowns.values(found.x)[bias] == pytest.approx(1e5, rel=0.05)
+
+
 @pytest.mark.parametrize("seals", [0.0, 1.0])
 def test_friction_of_seals_is_told_from_that_of_bearings(seals: float) -> None:
     path = "effects.pressure_dependent_friction"

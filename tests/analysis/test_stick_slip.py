@@ -26,6 +26,7 @@ from emir_analysis.diagnosis.friction_laws import (
     gradual,
     is_along_the_way,
     is_gradual,
+    is_uneven,
     nested,
 )
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
@@ -195,12 +196,12 @@ def test_what_is_far_off_over_the_beginning_is_no_matter_of_friction(
     start, tried = fullest(trial(sheet, ()), sheet), []
 
     def fitted(law: Trial, *_: object) -> Begun:
-        tried.append(is_along_the_way(law))
+        tried.append((is_along_the_way(law), is_uneven(law)))
         return Begun(Law(law, at(law, 2.3)), [])
 
     monkeypatch.setattr(friction_beginning, "_begun", fitted)
     assert begun(start, evidence, searched.floor) is None
-    assert tried == [False, True]
+    assert tried == [(False, False), (True, False), (False, True)]
 
 
 @pytest.mark.parametrize(("left", "gradually"), [(1.0, True), (1.4, True), (2.3, False)])

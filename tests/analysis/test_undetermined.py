@@ -9,8 +9,10 @@ from operated import moved, operated
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import with_spread
 from emir_analysis.diagnosis.result import OPEN, effect_results, parameter_line
+from emir_analysis.diagnosis.select import HOPELESS, beyond, excess
 from emir_analysis.diagnosis.telling import between_steps, open_shares
 from emir_analysis.diagnosis.trial import Trial, trial
+from emir_analysis.diagnosis.whole import Whole
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 
@@ -64,7 +66,7 @@ def test_of_two_that_do_the_same_each_is_as_uncertain_as_the_maker_leaves_the_ot
 
 PLAY = "effects.valve_hysteresis."
 RAMP = 0.5 * np.concatenate([np.linspace(0.0, 1.0, 30), np.ones(30), np.linspace(1.0, 0.0, 30)])
-JUMP = 0.5 * np.repeat([1.0, 0.0], 30)
+JUMP = np.repeat([0.5, 0.0, 0.2, 0.0], 30)  # of two sizes: of one, play of another width may do
 
 
 @pytest.mark.parametrize(("course", "open_"), [(RAMP, True), (JUMP, False)])
@@ -97,3 +99,42 @@ def test_a_threshold_is_told_where_it_is_crossed(pressure: float, *, told: bool)
     assert low <= pressure <= high
     assert (low > threshold.value(threshold.low)) == told
     assert high < threshold.value(threshold.high)
+
+
+DROOP = "effects.supply_pressure_droop."
+
+
+def drooping(openings: tuple[float, ...], resistance: float) -> tuple[Trial, Evidence]:
+    """Return a pump that droops with the square of the flow, to be fitted, and its recording."""
+    stated, rest = joint1(), np.zeros(60)
+    moves = [np.concatenate([rest, np.full(60, y), rest, np.full(45, -y)]) for y in openings]
+    command = np.concatenate([*moves, rest, *moves, rest])
+    hidden = {DROOP + "resistance": resistance, DROOP + "turbulent_share": 1.0}
+    evidence = Evidence([operated(with_values(stated, hidden), command)], stated)
+    return trial(Sheet(stated, {}, {}, ()), ("supply_pressure_droop",)), evidence
+
+
+@pytest.mark.parametrize(
+    ("openings", "resistance", "open_"), [((0.55,), 8e9, True), ((0.45, 0.8), 1.1e10, False)]
+)
+def test_by_which_law_a_pump_droops_other_flows_alone_tell(
+    openings: tuple[float, ...], resistance: float, *, open_: bool
+) -> None:
+    """At one flow its square is that flow times another number, half of it here."""
+    begun, evidence = drooping(openings, resistance)
+    by_square = begun.fixed(DROOP + "turbulent_share", 1.0)
+    size, settling = by_square.unknowns.members
+    found = open_shares(by_square.at(np.array([size.at(resistance), settling.at(0.2)])), evidence)
+    assert (DROOP + "turbulent_share" in found) == open_
+
+
+def test_a_share_that_was_led_to_the_wrong_end_is_begun_anew_at_the_size_it_needs() -> None:
+    """As far as its flow is right a droop in proportion to it makes too much at others."""
+    begun, evidence = drooping((0.45, 0.8), 1.1e10)
+    size, settling, share = begun.unknowns.members
+    by_flow = begun.at(np.array([size.at(5.4e9), settling.at(0.2), share.at(0.0)]))
+    assert excess(by_flow, evidence) > beyond(HOPELESS)
+    whole = Whole(evidence, Sheet(joint1(), {}, {}, ()), np.ones(5), lambda _: None)
+    found = whole._with_other_shares(by_flow)
+    assert excess(found, evidence) < beyond(1.05)
+    assert found.machine.effects.supply_pressure_droop.turbulent_share > 0.95

@@ -571,31 +571,21 @@ class PressedSeals(Hidden):
         return super().accelerations(x, time, angle, push - self.sizes["seals_rub"] * pressed * dry)
 
 
-class UnevenSeals(Hidden):
-    """Dry friction of two lips, of which one scrapes as the rod goes out, the other as it comes."""
+class UnevenFriction(Hidden):
+    """A seal that rubs less on the way down."""
 
-    name = "coulomb_friction~uneven"
-    grows = ("scrapes_out", "scrapes_in")
-    scales: ClassVar[dict[str, Scale]] = {
-        "scrapes_out": lifting_force,
-        "scrapes_in": lifting_force,
-    }
+    name = "coulomb_friction~by_direction"
+    grows = ("rub",)
+    scales: ClassVar[dict[str, Scale]] = {"rub": lifting_force}
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
-        smaller, ratio = between(random, 4e3, 1.2e4), between(random, 1.4, 2.2)
-        out = random.uniform() < 0.5
-        return {
-            "scrapes_out": smaller * (ratio if out else 1.0),
-            "scrapes_in": smaller * (1.0 if out else ratio),
-            "scrapes_from": between(random, 2e-4, 2e-3),
-        }
+        return {"rub": between(random, 5e3, 2e4), "less": random.uniform(0.3, 0.6)}
 
     def resistance(self, velocity: float, force: float, stroke: float) -> float:
-        s = self.sizes
-        moving = velocity / math.hypot(velocity, s["scrapes_from"])
-        lip = s["scrapes_out"] if velocity > 0.0 else s["scrapes_in"]
-        return super().resistance(velocity, force, stroke) + lip * moving
+        side = velocity / math.hypot(velocity, 1e-3)
+        rub = self.sizes["rub"] * (1.0 if side > 0.0 else self.sizes["less"])
+        return super().resistance(velocity, force, stroke) + rub * side
 
 
 class NarrowGap(Hidden):
@@ -642,6 +632,6 @@ FOREIGN: tuple[type[Hidden], ...] = (
     StribeckOnBristles,
     LoadOnBristles,
     PressedSeals,
-    UnevenSeals,
+    UnevenFriction,
     NarrowGap,
 )

@@ -52,23 +52,6 @@ class SmoothHysteresis(Hidden):
         return [*super().start_memory(angle, x), 0.0]
 
 
-class UnevenFriction(Hidden):
-    """A seal that rubs less on the way down."""
-
-    name = "coulomb_friction~by_direction"
-    grows = ("rub",)
-    scales: ClassVar[dict[str, Scale]] = {"rub": lifting_force}
-
-    @classmethod
-    def draw(cls, random: Random) -> Sizes:
-        return {"rub": between(random, 5e3, 2e4), "less": random.uniform(0.3, 0.6)}
-
-    def resistance(self, velocity: float, force: float, stroke: float) -> float:
-        side = velocity / math.hypot(velocity, 1e-3)
-        rub = self.sizes["rub"] * (1.0 if side > 0.0 else self.sizes["less"])
-        return super().resistance(velocity, force, stroke) + rub * side
-
-
 class AirInOneChamber(Hidden):
     """Bubbles in the lowering chamber alone."""
 
@@ -231,7 +214,6 @@ class StraightFriction(Hidden):
 
 FOREIGN: tuple[type[Hidden], ...] = (
     SmoothHysteresis,
-    UnevenFriction,
     AirInOneChamber,
     StiffeningHose,
     PasteFriction,

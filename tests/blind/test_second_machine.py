@@ -294,9 +294,9 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"seals_rub": 0.03, "rubs_from": 1e-3},
         {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0, "seal_share": 1.0},
     ),
-    _OTHER["coulomb_friction~uneven"]: (
-        {"scrapes_out": 8e3, "scrapes_in": 1.6e4, "scrapes_from": 3e-4},
-        {"force": 1.2e4, "smoothing_speed": 3e-4, "gradual_share": 1.0, "asymmetry": -1.0 / 3.0},
+    _OTHER["coulomb_friction~by_direction"]: (
+        {"rub": 1.6e4, "less": 0.5},
+        {"force": 1.2e4, "smoothing_speed": 1e-3, "gradual_share": 1.0, "asymmetry": 1.0 / 3.0},
     ),
     _OTHER["viscous_friction~square"]: (
         {"film": 5e4, "gap": 4e6},

@@ -296,6 +296,8 @@ def test_a_judge_recording_lacks_nothing_that_other_parameters_explain(
     assert judgement.surprising
     assert judgement.reconciled == reconciled
     assert verdict(off_there, judgement) == ("nothing_missing" if reconciled else "unexplained")
+    unclear = judged(replace(off_there, verdict="ambiguous"), other.experiments)
+    assert unclear.reconciled == reconciled
     said = "which other parameters inside the tolerances explain as well: diagnose from that too"
     assert (said in statement(off_there, judgement)) == reconciled
 
@@ -340,6 +342,8 @@ def test_what_explains_one_recording_alone_is_not_found(
     judgement = judged(found, search(there)[2].experiments)
     assert judgement.off("with_effect") > HOPELESS
     assert verdict(found, judgement) == said
+    unclear = replace(found, verdict="ambiguous", rivals=(found.chosen,))
+    assert verdict(unclear, judgement) == ("ambiguous" if said == "found" else said)
     alone = f"in {evidence.name} alone explained by payload; but"
     assert statement(found, judgement).startswith(alone) == (said == "unexplained")
 
@@ -421,6 +425,17 @@ def test_a_gauge_that_is_off_beside_friction_is_no_friction_that_differs_with_th
     found = diagnosed({"effects.coulomb_friction.force": 9.5e3, bias: 1e5})
     assert set(found.effects) == {"coulomb_friction", "sensor_bias"}
     assert found.unknowns.values(found.x)[bias] == pytest.approx(1e5, rel=0.05)
+
+
+def test_an_uneven_friction_is_taken_for_an_even_one_and_a_gauge_that_is_off() -> None:
+    hidden = {"coulomb_friction.force": 9.5e3, "coulomb_friction.asymmetry": 0.3}
+    begun = search({f"effects.{path}": value for path, value in hidden.items()})
+    known = fitted(begun, "coulomb_friction", "sensor_bias")
+    assert excess(known, begun[2]) > beyond(LEFT)
+    plain = begun[0].whole.plainer(known)
+    assert plain.effects == ("coulomb_friction",)
+    asymmetry = plain.machine.effects.coulomb_friction.asymmetry
+    assert asymmetry == pytest.approx(0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("seals", [0.0, 1.0])
@@ -1052,6 +1067,18 @@ def test_a_size_that_was_set_to_all_of_it_is_still_told() -> None:
     piloted = alone.fixed("effects.logic_block_fault.pilot", 1.0)
     (effect,) = effect_results(piloted, {})
     assert [(n, p.value) for n, p in effect.parameters.items()] == [("pilot", 1.0)]
+
+
+def test_what_an_effect_has_besides_and_was_not_asked_for_is_not_told() -> None:
+    """But which form it has is."""
+    sheet = Sheet(joint1(), TOLERANCES, {}, ())
+    names = ("coulomb_friction", "viscous_friction", "valve_dead_zone_error")
+    dry, viscous, edges = effect_results(trial(sheet, names), {})
+    assert "asymmetry" not in dry.parameters
+    assert "square" not in viscous.parameters
+    assert edges.parameters["edge"].value == 0.0
+    uneven = trial(sheet, names).fixed("effects.coulomb_friction.asymmetry", 0.2)
+    assert effect_results(uneven, {})[0].parameters["asymmetry"].value == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(("half_width", "figures"), [(0.3, 3), (4e-3, 3), (5e-5, 5), (0.0, 3)])

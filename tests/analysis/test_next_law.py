@@ -10,7 +10,7 @@ from test_diagnosis_search import search
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import fit_balances
 from emir_analysis.diagnosis.friction_beginning import LEFT_EARLY, refined
-from emir_analysis.diagnosis.friction_laws import without_breakaway
+from emir_analysis.diagnosis.friction_laws import is_uneven, without_breakaway
 from emir_analysis.diagnosis.next_law import Laws, next_laws
 from emir_analysis.diagnosis.stick_slip import Grown
 from emir_analysis.diagnosis.trial import trial
@@ -82,6 +82,19 @@ def test_a_fuller_law_is_asked_about_before_any_effect() -> None:
     stribeck = found.laws.law.machine.effects.stribeck_friction
     assert stribeck.breakaway == pytest.approx(1.8, rel=0.05)
     assert not found.laws.fuller
+
+
+def test_friction_that_differs_with_the_direction_is_asked_about_before_any_effect() -> None:
+    led, laws, evidence, sheet = lost(STICKING | {"effects.coulomb_friction.asymmetry": 0.3})
+    found = next_laws(led, laws, evidence, sheet)
+    assert found is not None
+    law, (fuller,) = found.laws
+    assert law.effects == COULOMB
+    assert found.left < 1.03
+    friction = law.machine.effects.coulomb_friction
+    assert friction.asymmetry == pytest.approx(0.3, abs=0.02)
+    assert friction.force == pytest.approx(1e4, rel=0.03)
+    assert is_uneven(fuller)
 
 
 def test_a_break_away_and_an_effect_are_found_that_explain_only_together() -> None:

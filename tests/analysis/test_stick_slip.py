@@ -1,6 +1,7 @@
 """The friction of a machine that sticks and slips, from a beginning that grows."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from emir_analysis.diagnosis.friction_laws import (
     is_gradual,
     is_uneven,
     nested,
+    uneven,
 )
 from emir_analysis.diagnosis.friction_starts import SHAPES, friction_starts
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
@@ -126,13 +128,16 @@ def test_seals_that_give_before_they_slide_are_found() -> None:
     assert stribeck.presliding_time == pytest.approx(1.5e-3, rel=0.3)
 
 
-def test_no_more_friction_stays_than_there_is() -> None:
+@pytest.mark.parametrize("asked", [lambda law: law, uneven], ids=["even", "uneven"])
+def test_no_more_friction_stays_than_there_is(asked: Callable[[Trial], Trial]) -> None:
     """A machine with Coulomb friction alone."""
     searched, sheet, evidence = search(SLIDING)
-    law = begun(fullest(trial(sheet, ()), sheet), evidence, searched.floor)
+    law = begun(asked(fullest(trial(sheet, ()), sheet)), evidence, searched.floor)
+    assert is_uneven(law) == (asked is uneven)
     law, *_ = with_less_friction(law, evidence, sheet, searched.floor)
     fitted = Growths(evidence).grown(law).trial
     assert fitted.effects == ("coulomb_friction",)
+    assert not is_uneven(fitted)
     errors = np.concatenate(free_run_errors(fitted.machine, evidence))
     assert np.sqrt(np.mean(errors**2)) < 1.05
     assert fitted.machine.effects.coulomb_friction.force == pytest.approx(2e4, rel=0.03)

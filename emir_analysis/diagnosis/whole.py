@@ -24,7 +24,6 @@ from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD, mean_while_it_acts
 from emir_analysis.diagnosis.next_law import Laws, next_laws
 from emir_analysis.diagnosis.payload_place import with_place
-from emir_analysis.diagnosis.resized import resized
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
@@ -154,16 +153,15 @@ class Whole:
     def _with_other_shares(self, fitted: Trial) -> Trial:
         """Return a trial fitted again from none and all of its shares, where that is better.
 
-        Of the size that suits it there. A share may have been led to the wrong place while another
-        effect was missing. One that does next to nothing, as the direction of a force that is all
-        on the piston, or is there already, leads nowhere.
+        A share may have been led to the wrong place while another effect was missing. One that
+        does next to nothing, as the direction of a force that is all on the piston, or is there
+        already, leads nowhere.
         """
         for k, unknown in enumerate(fitted.unknowns.members):
             for end in (unknown.low, unknown.high) if unknown.is_share else ():
                 begun = fitted.at(moved(fitted.x, [k], [end]))
                 elsewhere = abs(self.score(begun) - self.score(fitted)) > STRONG
                 if elsewhere and self._excess(fitted) > beyond(LEFT):
-                    begun = resized(begun, unknown.path, self._evidence)
                     begun = glimpsed(begun, self._evidence)
                     if self.score(begun) < self.score(fitted) - STRONG:
                         fitted = refine_free_run(begun, self._evidence)

@@ -9,10 +9,8 @@ from operated import moved, operated
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fitting import with_spread
 from emir_analysis.diagnosis.result import OPEN, effect_results, parameter_line
-from emir_analysis.diagnosis.select import HOPELESS, beyond, excess
 from emir_analysis.diagnosis.telling import between_steps, open_shares
 from emir_analysis.diagnosis.trial import Trial, trial
-from emir_analysis.diagnosis.whole import Whole
 from emir_common.parameter_tree import with_values
 from emir_plant.sheet import Sheet, joint1
 
@@ -126,15 +124,3 @@ def test_by_which_law_a_pump_droops_other_flows_alone_tell(
     size, settling = by_square.unknowns.members
     found = open_shares(by_square.at(np.array([size.at(resistance), settling.at(0.2)])), evidence)
     assert (DROOP + "turbulent_share" in found) == open_
-
-
-def test_a_share_that_was_led_to_the_wrong_end_is_begun_anew_at_the_size_it_needs() -> None:
-    """As far as its flow is right a droop in proportion to it makes too much at others."""
-    begun, evidence = drooping((0.45, 0.8), 1.1e10)
-    size, settling, share = begun.unknowns.members
-    by_flow = begun.at(np.array([size.at(5.4e9), settling.at(0.2), share.at(0.0)]))
-    assert excess(by_flow, evidence) > beyond(HOPELESS)
-    whole = Whole(evidence, Sheet(joint1(), {}, {}, ()), np.ones(5), lambda _: None)
-    found = whole._with_other_shares(by_flow)
-    assert excess(found, evidence) < beyond(1.05)
-    assert found.machine.effects.supply_pressure_droop.turbulent_share > 0.95

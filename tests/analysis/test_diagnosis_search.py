@@ -344,6 +344,8 @@ def test_what_explains_one_recording_alone_is_not_found(
     assert verdict(found, judgement) == said
     unclear = replace(found, verdict="ambiguous", rivals=(found.chosen,))
     assert verdict(unclear, judgement) == ("ambiguous" if said == "found" else said)
+    either = f"in {evidence.name} alone explained by payload or payload"
+    assert statement(unclear, judgement).startswith(either) == (said == "unexplained")
     alone = f"in {evidence.name} alone explained by payload; but"
     assert statement(found, judgement).startswith(alone) == (said == "unexplained")
 

@@ -313,14 +313,18 @@ class BlockedPoppet(Hidden):
 
 
 class SlowToOpen(Hidden):
-    """A logic block whose pilot line is narrow: it opens late."""
+    """A logic block with a stiff spring and a narrow pilot line: it shuts, and opens late."""
 
     name = "logic_block_fault~slow to open"
-    grows = ("opens_in",)
+    grows = ("opens_in", "opens_at")
 
     @classmethod
     def draw(cls, random: Random) -> Sizes:
-        return {"opens_in": between(random, 0.3, 1.0)}
+        return {"opens_in": between(random, 0.3, 1.0), "opens_at": between(random, 1.5, 2.5)}
+
+    def changed(self, numbers: Numbers) -> Numbers:
+        n = super().changed(numbers)
+        return Numbers(**{**vars(n), "threshold": self.sizes["opens_at"] * n.threshold})
 
     def logic_rate(self, opened: float, pilot: float) -> float:
         if pilot > self.n.threshold:

@@ -245,8 +245,11 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
     ),
     _OTHER["logic_block_fault~blocked"]: ({"in_the_way": 0.6}, {"blocked": 0.6}),
     _OTHER["logic_block_fault~slow to open"]: (
-        {"opens_in": 0.8},
-        {"opening": 0.8 / STATED.time_constant_opening - 1.0},
+        {"opens_in": 0.8, "opens_at": 1.2},
+        {
+            "opening": 0.8 / STATED.time_constant_opening - 1.0,
+            "threshold": 0.2 * STATED.threshold,
+        },
     ),
     _OTHER["vessel_compliance~beta"]: (
         {"softer": -0.3, "where": 1.0},

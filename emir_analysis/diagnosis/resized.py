@@ -12,8 +12,7 @@ from emir_analysis.diagnosis.fit import mean_squares
 from emir_analysis.diagnosis.missing import in_free_run
 from emir_analysis.diagnosis.trial import Trial, moved
 
-TIMES = np.geomspace(0.15, 7.0, 40)  # as large; what acts only beyond some flow asks for steps of
-# a tenth
+TIMES = np.geomspace(0.15, 7.0, 40)  # of a tenth: what acts beyond some flow alone needs no less
 
 
 def resized(known: Trial, share: str, evidence: Evidence) -> Trial:

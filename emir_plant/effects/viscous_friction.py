@@ -16,9 +16,9 @@ class ViscousFriction(Effect):
     """
 
     balance: ClassVar[Balance] = "force"
-    sizes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    sizes: ClassVar[tuple[str, ...]] = ("coefficient", "square")
     source: ClassVar[str] = "oil film of the seals; 2-10 kN at 25 mm/s"
-    trial: ClassVar[dict[str, float]] = {"coefficient": 1e5}
+    trial: ClassVar[dict[str, float]] = {"coefficient": 1e5, "square": 1e6}
     given: ClassVar[tuple[str, ...]] = ("square",)
 
     coefficient: float = quantity("N s/m", 0.0, 1e7, "B", default=0.0)

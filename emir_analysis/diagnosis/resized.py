@@ -31,6 +31,6 @@ def _other_sizes(known: Trial, effect: str) -> Iterator[Trial]:
     for k, unknown in enumerate(known.unknowns.members):
         if unknown.path.rpartition(".")[0] == effect and not unknown.shapes:
             size = unknown.value(float(known.x[k]))
-            for other in TIMES * size:
+            for other in TIMES * size if size else ():
                 x = float(np.clip(unknown.at(float(other)), unknown.low, unknown.high))
                 yield known.at(moved(known.x, [k], [x]))

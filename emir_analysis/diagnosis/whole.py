@@ -27,6 +27,7 @@ from emir_analysis.diagnosis.payload_place import with_place
 from emir_analysis.diagnosis.run_errors import free_run_errors, mean_square
 from emir_analysis.diagnosis.select import (
     AT_NOISE,
+    EXPLAINED,
     HOPELESS,
     LEFT,
     MOST,
@@ -43,7 +44,7 @@ from emir_plant.effects import REGISTRY
 from emir_plant.effects.payload import Payload
 from emir_plant.sheet import Sheet
 
-STEADY = {"sensor_bias", LOAD}  # beside friction as one that differs with the direction
+STEADY = ("sensor_bias", LOAD)  # beside friction as one that differs with the direction
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
 # in 99 of 100 recordings
 
@@ -277,12 +278,17 @@ class Whole:
         return late if self.score(late) <= self.score(fitted) else fitted
 
     def _with_uneven_friction(self, fitted: Trial) -> Trial:
-        """Return a trial with uneven friction for a steady force beside an even one, if as good."""
-        for effect in STEADY.intersection(fitted.effects if sticks(fitted) else ()):
-            begun = refine_free_run(uneven(fitted.without(effect)), self._evidence)
-            found = self._led_again(begun)
-            if self.score(found) <= self.score(fitted):
-                return found
+        """Return a trial with uneven friction for a steady force beside an even one, if as good.
+
+        Before the first move the two are not the same.
+        """
+        for effect in STEADY if sticks(fitted) else ():
+            if effect in fitted.effects:
+                found = refine_free_run(uneven(fitted.without(effect)), self._evidence)
+                if self._excess(found) <= beyond(EXPLAINED):
+                    found = self._led_again(found)
+                if self.score(found) <= self.score(fitted):
+                    return found
         return fitted
 
     def keep(self, fitted: Trial) -> None:

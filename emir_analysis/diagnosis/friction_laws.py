@@ -7,11 +7,9 @@ import numpy as np
 from emir_analysis.diagnosis.balances import FORCE
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.trial import Trial, trial
-from emir_analysis.diagnosis.unknowns import Unknown
+from emir_analysis.diagnosis.unknowns import Unknown, first_tried, in_proportion
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
-from emir_common.quantity import quantities
-from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
@@ -20,8 +18,6 @@ GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begi
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
 DAMPED, MOST_DAMPED = 1e-3, 0.05  # s, by their damping: where a fit begins, and the most
 UNEVEN = 0.2  # share by which friction differs with the direction, about
-LEAST_VISCOUS = 1.0  # N s/m, for a scale where there is none
-FAST = 0.1  # m/s, at which what grows with the square may be as much as what grows with speed
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
 
@@ -95,9 +91,7 @@ def uneven(known: Trial) -> Trial:
 
 
 def _uneven(known: Trial, name: str) -> Trial:
-    about = quantities(REGISTRY[name])["asymmetry"]
-    low, high = about.low / UNEVEN, about.high / UNEVEN
-    return known.also(Unknown(_asymmetry(name), "1", 0.0, UNEVEN, low, high, 0.0, False))
+    return known.also(in_proportion(name, "asymmetry", UNEVEN, 0.0))
 
 
 def even(known: Trial) -> Trial:
@@ -161,9 +155,8 @@ def with_square(known: Trial) -> Trial | None:
     path = f"effects.{VISCOUS}.square"
     if VISCOUS not in known.effects or path in known.unknowns.values(known.x):
         return None
-    about = quantities(REGISTRY[VISCOUS])["square"]
-    scale = max(known.machine.effects.viscous_friction.coefficient, LEAST_VISCOUS) / FAST
-    return known.also(Unknown(path, about.unit, 0.0, scale, 0.0, about.high / scale, 0.0, False))
+    scale = first_tried(VISCOUS, "square", known.machine)
+    return known.also(in_proportion(VISCOUS, "square", scale, 0.0))
 
 
 def breakaway_may_be_none(known: Trial) -> bool:

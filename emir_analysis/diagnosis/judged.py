@@ -36,6 +36,7 @@ class Judged:
     runs: by stage, the free run's outputs (n, 4) of each recording, SI units. one_step: by stage,
     errors (n, 4) of the change from one sample to the next, of each recording, as in `Balances`.
     NaN where an output has no sensor or a machine cannot rest where the recording starts.
+    rivals: RMS error of each of them, all signals together, in units of the sensors' noise.
     surprising: what was found does not explain them, or one of their signals. reconciled: the same
     effects, or none, do with other parameters inside the tolerances, and the recordings that were
     fitted, too; not asked where something is known to be unexplained or sticks.
@@ -44,6 +45,7 @@ class Judged:
     evidence: Evidence
     runs: dict[str, list[Array]]
     one_step: dict[str, list[Array]]
+    rivals: tuple[float, ...]
     surprising: bool
     reconciled: bool
 
@@ -90,7 +92,8 @@ def judged(findings: Findings, experiments: Sequence[Experiment]) -> Judged:
     asked = findings.verdict != "unexplained" and not sticks(chosen)
     asked = asked and not has_course(findings.chosen)
     reconciled = asked and surprising and _reconciled(findings, evidence)
-    return Judged(evidence, runs, one_step, surprising, reconciled)
+    rivals = tuple(math.sqrt(mean_square(rival, evidence)) for rival in findings.rivals)
+    return Judged(evidence, runs, one_step, rivals, surprising, reconciled)
 
 
 def carries(findings: Findings, judged: Judged) -> bool:
@@ -103,18 +106,13 @@ def carries(findings: Findings, judged: Judged) -> bool:
     named = [findings.chosen, *findings.rivals]
     if judged.reconciled or any(_known_here_alone(trial) for trial in named):
         return True
-    off = [judged.off(STAGES[-1]), *(_off(rival, judged.evidence) for rival in findings.rivals)]
-    alone = judged.off(REFITTED)
+    off, alone = (judged.off(STAGES[-1]), *judged.rivals), judged.off(REFITTED)
     return not all(left > HOPELESS and left >= HELPS * alone for left in off)  # NaN: no rest there
 
 
 def _known_here_alone(trial: Trial) -> bool:
     """Tell whether other recordings say little of a trial."""
     return not trial.effects or bool(OF_ONE_RUN.intersection(trial.effects)) or sticks(trial)
-
-
-def _off(rival: Trial, judge: Evidence) -> float:
-    return math.sqrt(mean_square(rival, judge))
 
 
 def loudest_signal(machine: Machine, evidence: Evidence) -> tuple[str, float]:

@@ -4,8 +4,7 @@ Looked for where one at the TCP leaves something: whatever else is missing would
 """
 
 from emir_analysis.diagnosis.trial import Trial
-from emir_analysis.diagnosis.unknowns import Unknown
-from emir_common.quantity import quantities
+from emir_analysis.diagnosis.unknowns import in_proportion
 from emir_plant.effects.payload import Payload
 
 PLACE = "effects.payload.place"
@@ -15,6 +14,5 @@ def with_place(known: Trial) -> Trial | None:
     """Return a trial whose payload's place is fitted, too; None: no payload, or it is already."""
     if "payload" not in known.effects or PLACE in known.unknowns.values(known.x):
         return None
-    about = quantities(Payload)["place"]
-    place = Unknown(PLACE, about.unit, 0.0, 1.0, about.low, about.high, known.form[PLACE], False)
+    place = in_proportion("payload", "place", 1.0, known.form[PLACE])
     return known.formed({PLACE: Payload.place}).also(place)

@@ -22,6 +22,7 @@ def _speed(m: Machine) -> float:
 SCALES: dict[str, Callable[[Machine], float]] = {  # by a size's unit; others stay as they are
     "N": _force,
     "N s/m": lambda m: _force(m) / _speed(m),
+    "N s^2/m^2": lambda m: _force(m) / _speed(m) ** 2,
     "kg": lambda m: m.geometry.boom_mass,
     "m^3/(s Pa)": lambda m: m.valve.flow_nominal / m.supply.p0,
     "m^3/Pa": lambda m: m.cylinder.area_lifting * m.geometry.triangle_b / m.cylinder.beta,

@@ -12,7 +12,9 @@ from emir_analysis.diagnosis.fit import mean_squares
 from emir_analysis.diagnosis.missing import in_free_run
 from emir_analysis.diagnosis.trial import Trial, moved
 
-TIMES = np.geomspace(0.15, 7.0, 40)  # of a tenth: what acts beyond some flow alone needs no less
+# times as large, in steps of a tenth: between coarser ones what acts beyond some flow does nothing,
+# and then far too much
+TIMES = np.geomspace(0.15, 7.0, 40)
 
 
 def resized(known: Trial, share: str, evidence: Evidence) -> Trial:

@@ -11,13 +11,7 @@ from emir_analysis.diagnosis.fitting import glimpsed
 from emir_analysis.diagnosis.free_run import COMPARED, free_runs
 from emir_analysis.diagnosis.friction_laws import sticks
 from emir_analysis.diagnosis.resized import resized
-from emir_analysis.diagnosis.select import (
-    HOPELESS,
-    STRONG,
-    beyond,
-    excess,
-    free_run_score,
-)
+from emir_analysis.diagnosis.select import HOPELESS, STRONG, beyond, excess, free_run_score
 from emir_analysis.diagnosis.trial import Trial
 from emir_analysis.diagnosis.unknowns import is_share
 from emir_analysis.root_mean_square import rms

@@ -171,22 +171,37 @@ def _toleranced(stated: Mapping[str, object], path: str, tolerance: float) -> Un
 
 def _of_effect(effect: str, machine: Machine) -> list[Unknown]:
     kind = REGISTRY[effect]
-    stated = kind()
     members = []
     for name, about in quantities(kind).items():
         unseen = name == STROKE and not machine.sensors.own_stroke
         if unseen or name in kind.other_law or name in kind.given:
             continue
-        value = float(kind.trial.get(name, getattr(stated, name)))
-        if name in kind.sizes:
-            value = min(value * proportion(about.unit, machine), about.high)
         path = f"effects.{effect}.{name}"
+        value = first_tried(effect, name, machine)
         if about.low > 0.0 and about.high / about.low > WIDE:
             low = math.log(about.low / value) + ROUNDING
             high = math.log(about.high / value) - ROUNDING
             members.append(Unknown(path, about.unit, value, 1.0, low, high, 0.0, False, True))
         else:
-            low = (about.low + ROUNDING * abs(about.low)) / abs(value)
-            high = (about.high - ROUNDING * abs(about.high)) / abs(value)
-            members.append(Unknown(path, about.unit, 0.0, abs(value), low, high, 1.0, False))
+            members.append(in_proportion(effect, name, abs(value), 1.0))
     return members
+
+
+def first_tried(effect: str, name: str, machine: Machine) -> float:
+    """Return the value at which a search begins with a parameter of an effect, SI unit."""
+    kind = REGISTRY[effect]
+    about = quantities(kind)[name]
+    value = float(kind.trial.get(name, getattr(kind(), name)))
+    return min(value * proportion(about.unit, machine), about.high) if name in kind.sizes else value
+
+
+def in_proportion(effect: str, name: str, scale: float, start: float) -> Unknown:
+    """Return a parameter of an effect as an unknown: value = scale x.
+
+    scale: SI unit. start: x at which a search starts.
+    """
+    about = quantities(REGISTRY[effect])[name]
+    low = (about.low + ROUNDING * abs(about.low)) / scale
+    high = (about.high - ROUNDING * abs(about.high)) / scale
+    path = f"effects.{effect}.{name}"
+    return Unknown(path, about.unit, 0.0, scale, low, high, start, False)

@@ -189,14 +189,17 @@ class Whole:
         begun, at_tcp = with_place(fitted), fitted.machine.effects.payload.place == Payload.place
         if begun is None or (at_tcp and self._excess(fitted) <= beyond(LEFT)):
             return fitted
-        found = refine_free_run(begun, self._evidence)
-        return found if self._excess(found) < MOST * self._excess(fitted) else fitted
+        return self._if_most_goes(begun, fitted)
 
     def _with_square(self, fitted: Trial) -> Trial:
         """Return a trial whose viscous friction grows faster, where that takes most away."""
         begun = with_square(fitted)
         if begun is None or self._excess(fitted) <= beyond(LEFT):
             return fitted
+        return self._if_most_goes(begun, fitted)
+
+    def _if_most_goes(self, begun: Trial, fitted: Trial) -> Trial:
+        """Return a trial fitted from where it is begun, where most of what another leaves goes."""
         found = refine_free_run(begun, self._evidence)
         return found if self._excess(found) < MOST * self._excess(fitted) else fitted
 

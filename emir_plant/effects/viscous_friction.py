@@ -17,7 +17,9 @@ class ViscousFriction(Effect):
 
     balance: ClassVar[Balance] = "force"
     sizes: ClassVar[tuple[str, ...]] = ("coefficient", "square")
-    source: ClassVar[str] = "oil film of the seals; 2-10 kN at 25 mm/s"
+    source: ClassVar[str] = (
+        "oil film of the seals, 2-10 kN at 25 mm/s; narrow passages, as much again at 0.1 m/s"
+    )
     trial: ClassVar[dict[str, float]] = {"coefficient": 1e5, "square": 1e6}
     given: ClassVar[tuple[str, ...]] = ("square",)
 

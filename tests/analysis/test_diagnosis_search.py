@@ -21,7 +21,7 @@ from emir_analysis.diagnosis.experiment import Experiment
 from emir_analysis.diagnosis.fitting import fit_balances, fit_free_run, refine_free_run
 from emir_analysis.diagnosis.foresight import is_enough
 from emir_analysis.diagnosis.free_run import free_runs
-from emir_analysis.diagnosis.friction_laws import viscous_is_heard
+from emir_analysis.diagnosis.friction_laws import uneven, viscous_is_heard, with_square
 from emir_analysis.diagnosis.judged import judged
 from emir_analysis.diagnosis.result import ParameterResult, effect_results
 from emir_analysis.diagnosis.rounds import CLOSE
@@ -49,7 +49,7 @@ from emir_analysis.diagnosis.statement import closest, statement, verdict
 from emir_analysis.diagnosis.trial import Trial, trial
 from emir_analysis.diagnosis.trial import moved as changed
 from emir_analysis.diagnosis.tried import Tried, free
-from emir_analysis.diagnosis.unknowns import unknowns
+from emir_analysis.diagnosis.unknowns import first_tried, unknowns
 from emir_analysis.errors import InputError
 from emir_analysis.node_controls import CascadeControl
 from emir_analysis.root_mean_square import column_rms
@@ -406,6 +406,33 @@ def test_friction_that_grows_faster_than_the_speed_is_found() -> None:
     friction = found.machine.effects.viscous_friction
     assert friction.coefficient == pytest.approx(1e5, rel=0.04)
     assert friction.square == pytest.approx(3e6, rel=0.04)
+
+
+def test_a_number_that_is_fitted_late_is_not_rounded_beyond_its_range() -> None:
+    """A machine out of range raises; whether a rounded one is depends on its proportions."""
+    for pressure in np.linspace(150e5, 300e5, 60):
+        sheet = Sheet(with_values(joint1(), {"supply.p0": pressure}), {}, {}, ())
+        known = with_square(uneven(trial(sheet, ("viscous_friction", "coulomb_friction"))))
+        assert known is not None
+        least, most = (known.at(end).machine.effects for end in known.unknowns.bounds)
+        assert (least.viscous_friction.square, most.viscous_friction.square) == pytest.approx(
+            (0.0, 1e9)
+        )
+        assert least.coulomb_friction.asymmetry == pytest.approx(-0.5)
+        assert most.coulomb_friction.asymmetry == pytest.approx(0.5)
+
+
+def test_friction_by_the_square_begins_in_proportion_to_the_machine() -> None:
+    """With twice the force at half the speed it is eight times as much."""
+    slow = {
+        "supply.p0": 2.0 * joint1().supply.p0,
+        "valve.flow_nominal": 0.5 * joint1().valve.flow_nominal,
+    }
+    tried = [
+        first_tried("viscous_friction", "square", m)
+        for m in (joint1(), with_values(joint1(), slow))
+    ]
+    assert tried[1] == pytest.approx(8.0 * tried[0])
 
 
 @pytest.mark.parametrize(

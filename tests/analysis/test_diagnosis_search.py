@@ -343,6 +343,8 @@ def test_what_explains_one_recording_alone_is_not_found(
     assert judgement.off("with_effect") > HOPELESS
     assert verdict(found, judgement) == said
     unclear = replace(found, verdict="ambiguous", rivals=(found.chosen,))
+    judgement = judged(unclear, judgement.evidence.experiments)
+    assert judgement.rivals == pytest.approx((judgement.off("with_effect"),), rel=1e-6)
     assert verdict(unclear, judgement) == ("ambiguous" if said == "found" else said)
     either = f"in {evidence.name} alone explained by payload or payload"
     assert statement(unclear, judgement).startswith(either) == (said == "unexplained")

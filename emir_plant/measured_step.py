@@ -129,7 +129,8 @@ def _swing_spool(x: Array, command: float, swing: Array, after: Array) -> None:
 @compiled_in_place
 def _opened(opening: float, before: Array, after: Array, time: float, p: Any) -> float:
     """Return y4 after a time, s, in which the measured pressures go evenly from before to after."""
-    first, last = _beyond_threshold(before, p), _beyond_threshold(after, p)
+    threshold = logic_block_fault.threshold(opening, p)
+    first, last = _pilot(before, p) - threshold, _pilot(after, p) - threshold
     if (first > 0.0) == (last > 0.0):
         return _opened_by(opening, last > 0.0, time, p)
     crossed = time * first / (first - last)
@@ -138,9 +139,8 @@ def _opened(opening: float, before: Array, after: Array, time: float, p: Any) ->
 
 
 @compiled_in_place
-def _beyond_threshold(measured: Array, p: Any) -> float:
-    pilot = logic_block.pilot_pressure(measured[0], measured[1], p)
-    return pilot - logic_block_fault.threshold(p)
+def _pilot(measured: Array, p: Any) -> float:
+    return logic_block.pilot_pressure(measured[0], measured[1], p)
 
 
 @compiled_in_place

@@ -20,6 +20,7 @@ from emir_analysis.diagnosis.friction_laws import (
     with_square,
     without_breakaway,
 )
+from emir_analysis.diagnosis.held_open import held_open
 from emir_analysis.diagnosis.late_command import late_command
 from emir_analysis.diagnosis.loads import LOAD, mean_while_it_acts
 from emir_analysis.diagnosis.next_law import Laws, next_laws
@@ -73,7 +74,7 @@ class Whole:
                 else:
                     fitted = self._with_other_shares(self._refined_again(fitted))
                     fitted = self._with_square(fitted)
-            fitted = self._with_payload_elsewhere(fitted)
+            fitted = self._held_open(self._with_payload_elsewhere(fitted))
             self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
         return self._known[chosen.effects]
 
@@ -197,6 +198,13 @@ class Whole:
         if begun is None or self._excess(fitted) <= beyond(LEFT):
             return fitted
         return self._if_most_goes(begun, fitted)
+
+    def _held_open(self, fitted: Trial) -> Trial:
+        """Return a trial whose logic block shuts below where it opens, where most goes."""
+        ways = held_open(fitted)
+        if not ways or self._excess(fitted) <= beyond(LEFT):
+            return fitted
+        return self._if_most_goes(min(ways, key=self.score), fitted)
 
     def _if_most_goes(self, begun: Trial, fitted: Trial) -> Trial:
         """Return a trial fitted from where it is begun, where most of what another leaves goes."""

@@ -12,13 +12,20 @@ from emir_plant.jit import compiled
 class LogicBlockFault(Effect):
     """Threshold, pilot or times off, or a poppet that does not open all the way.
 
-    p_threshold + threshold; T_closing (1 + closing); T_opening (1 + opening); a pilot pressure
-    mixed with a share of the other chamber's (a leaking pilot line); and y4 goes to 1 - blocked in
-    place of 1.
+    p_threshold + threshold - hysteresis y4 (the pressure works on more of an open poppet);
+    T_closing (1 + closing); T_opening (1 + opening); a pilot pressure mixed with a share of the
+    other chamber's (a leaking pilot line); and y4 goes to 1 - blocked in place of 1.
     """
 
     balance: ClassVar[Balance] = "logic block"
-    sizes: ClassVar[tuple[str, ...]] = ("threshold", "closing", "opening", "pilot", "blocked")
+    sizes: ClassVar[tuple[str, ...]] = (
+        "threshold",
+        "closing",
+        "opening",
+        "pilot",
+        "blocked",
+        "hysteresis",
+    )
     source: ClassVar[str] = (
         "spring setting, a sticking or blocked pilot, dirt; magnitudes of a maladjusted valve"
     )
@@ -28,21 +35,25 @@ class LogicBlockFault(Effect):
         "opening": 2.0,
         "pilot": 0.1,
         "blocked": 0.3,
+        "hysteresis": 5e5,
     }
+    given: ClassVar[tuple[str, ...]] = ("hysteresis",)
     # the threshold is crossed by few minima of the pilot pressure, or by all
-    stepwise: ClassVar[tuple[str, ...]] = ("threshold", "pilot")
+    stepwise: ClassVar[tuple[str, ...]] = ("threshold", "pilot", "hysteresis")
 
     threshold: float = quantity("Pa", -5e7, 5e7, "added to the threshold", default=0.0)
     closing: float = quantity("1", -0.9, 20.0, "relative error of the closing time", default=0.0)
     opening: float = quantity("1", -0.9, 50.0, "relative error of the opening time", default=0.0)
     pilot: float = quantity("1", 0.0, 1.0, "share of the other chamber's pressure", default=0.0)
     blocked: float = quantity("1", 0.0, 0.95, "share of the opening that is missing", default=0.0)
+    hysteresis: float = quantity("Pa", 0.0, 5e7, "shuts below the threshold by", default=0.0)
 
 
 @compiled
-def threshold(p: Any) -> float:
-    """Return the threshold as it is, Pa."""
-    return p.threshold + p.logic_block_fault_threshold
+def threshold(opening: float, p: Any) -> float:
+    """Return the threshold of a block that is open by y4, Pa."""
+    raised = p.threshold + p.logic_block_fault_threshold
+    return raised - p.logic_block_fault_hysteresis * opening
 
 
 @compiled

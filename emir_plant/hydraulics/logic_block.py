@@ -15,9 +15,9 @@ def pilot_pressure(pressure_lifting: float, pressure_lowering: float, p: Any) ->
 
 
 @compiled
-def is_piloted(pilot_pressure: float, p: Any) -> bool:
-    """Tell whether the block is told to open by its pilot pressure, Pa."""
-    return pilot_pressure > logic_block_fault.threshold(p)
+def is_piloted(opening: float, pilot_pressure: float, p: Any) -> bool:
+    """Tell whether a block that is open by y4 is told to open by its pilot pressure, Pa."""
+    return pilot_pressure > logic_block_fault.threshold(opening, p)
 
 
 @compiled
@@ -26,7 +26,7 @@ def opening_rate(opening: float, pilot_pressure: float, p: Any) -> float:
 
     To less than 1 where something is in its way.
     """
-    if is_piloted(pilot_pressure, p):
+    if is_piloted(opening, pilot_pressure, p):
         missing = logic_block_fault.fully_open(p) - opening
         return missing / logic_block_fault.time_constant_opening(p)
     return -opening / logic_block_fault.time_constant_closing(p)
@@ -34,5 +34,5 @@ def opening_rate(opening: float, pilot_pressure: float, p: Any) -> float:
 
 @compiled
 def settled(pilot_pressure: float, p: Any) -> float:
-    """Return y4 once it has settled at a pilot pressure, Pa."""
-    return logic_block_fault.fully_open(p) if is_piloted(pilot_pressure, p) else 0.0
+    """Return y4 once a block that was shut has settled at a pilot pressure, Pa."""
+    return logic_block_fault.fully_open(p) if is_piloted(0.0, pilot_pressure, p) else 0.0

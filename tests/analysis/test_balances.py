@@ -135,6 +135,7 @@ def test_long_steps_of_integration_leave_the_balances_as_they_are(machine: Machi
         {"logic_block.time_constant_opening": 1e-3, "logic_block.threshold": 105e5},
         {"effects.logic_block_fault.opening": 50.0, "logic_block.threshold": 105e5},
         {"effects.logic_block_fault.blocked": 0.5, "logic_block.threshold": 105e5},
+        {"effects.logic_block_fault.hysteresis": 10e5, "logic_block.threshold": 105e5},
         {"valve.natural_frequency": 2000.0},
         {f"{DROOP}.resistance": 1e9, f"{DROOP}.time_constant": 1e-3},
         {f"{DROOP}.resistance": 1e10, f"{DROOP}.time_constant": 0.1},

@@ -332,6 +332,22 @@ class SlowToOpen(Hidden):
         return super().logic_rate(opened, pilot)
 
 
+class HeldOpen(Hidden):
+    """A logic block whose open poppet is pressed on all over: it shuts later than it opens."""
+
+    name = "logic_block_fault~held open"
+    grows = ("opens_at", "shuts_lower")
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {"opens_at": between(random, 1.5, 2.5), "shuts_lower": between(random, 0.2, 0.5)}
+
+    def logic_rate(self, opened: float, pilot: float) -> float:
+        opens = self.sizes["opens_at"] * self.n.threshold
+        held = opens * self.sizes["shuts_lower"] * opened
+        return super().logic_rate(opened, pilot - opens + held + self.n.threshold)
+
+
 class OtherOil(Hidden):
     """Oil softer or stiffer than stated, beyond what the maker allows for, in one chamber or both.
 
@@ -627,6 +643,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     LoadElsewhere,
     BlockedPoppet,
     SlowToOpen,
+    HeldOpen,
     OtherOil,
     SameSlope,
     OneEdge,

@@ -251,6 +251,10 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
             "threshold": 0.2 * STATED.threshold,
         },
     ),
+    _OTHER["logic_block_fault~held open"]: (
+        {"opens_at": 2.0, "shuts_lower": 0.4},
+        {"threshold": STATED.threshold, "hysteresis": 0.8 * STATED.threshold},
+    ),
     _OTHER["vessel_compliance~beta"]: (
         {"softer": -0.3, "where": 1.0},
         {"lowering": -0.3 * STATED.volume_lowering_0 / STATED.beta, "wall_share": 1.0},

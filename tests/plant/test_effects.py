@@ -855,8 +855,8 @@ def test_gain_that_drifts_long_goes_straight_and_never_below_nothing() -> None:
 def test_fault_of_the_logic_block_changes_threshold_closing_and_pilot() -> None:
     p = _with(logic_block_fault={"threshold": 10e5, "closing": 1.0, "pilot": 0.25}).record[0]
     stated = MACHINE.logic_block
-    assert not logic_block.is_piloted(stated.threshold + 9e5, p)
-    assert logic_block.is_piloted(stated.threshold + 11e5, p)
+    assert not logic_block.is_piloted(0.0, stated.threshold + 9e5, p)
+    assert logic_block.is_piloted(0.0, stated.threshold + 11e5, p)
     assert logic_block_fault.time_constant_closing(p) == pytest.approx(2.0 * 0.3)
     assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.6)
     assert logic_block.pilot_pressure(100e5, 20e5, p) == pytest.approx(80e5)
@@ -867,6 +867,22 @@ def test_a_narrow_pilot_line_opens_the_logic_block_late() -> None:
     slow = 10.0 * MACHINE.logic_block.time_constant_opening
     assert logic_block.opening_rate(0.0, 120e5, p) == pytest.approx(1.0 / slow)
     assert logic_block.opening_rate(1.0, 0.0, p) == pytest.approx(-1.0 / 0.3)  # shuts as stated
+
+
+def test_a_poppet_that_the_pressure_holds_open_shuts_below_where_it_opens() -> None:
+    """A pilot pressure that rises and falls slowly: between both thresholds all stays as it was."""
+    p = _with(logic_block_fault={"threshold": 20e5, "hysteresis": 15e5}).record[0]
+    opens = MACHINE.logic_block.threshold + 20e5
+    rising = np.arange(opens - 30e5, opens + 10e5, 1e5) + 0.5e5
+    opening, way = 0.0, []
+    for pilot in (*rising, *rising[::-1]):
+        for _ in range(2000):  # 2 s, some closing times
+            opening += 1e-3 * logic_block.opening_rate(opening, pilot, p)
+        way.append(opening > 0.5)
+    up, down = np.split(np.array(way), 2)
+    assert up.tolist() == (rising > opens).tolist()
+    assert down[::-1].tolist() == (rising > opens - 15e5).tolist()
+    assert logic_block.settled(opens - 5e5, p) == 0.0  # a machine at rest was shut before
 
 
 def test_a_blocked_poppet_opens_as_far_as_it_can_and_throttles_what_leaves() -> None:

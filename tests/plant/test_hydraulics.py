@@ -128,8 +128,8 @@ def test_logic_block_is_piloted_by_the_chamber_that_is_stated() -> None:
     high, little = 90 * BAR, 10 * BAR
     assert logic_block.pilot_pressure(high, little, P) == high
     assert logic_block.pilot_pressure(high, little, low) == little
-    assert logic_block.is_piloted(high, P)
-    assert not logic_block.is_piloted(little, P)
+    assert logic_block.is_piloted(0.0, high, P)
+    assert not logic_block.is_piloted(0.0, little, P)
 
 
 def test_a_block_that_the_lowering_chamber_pilots_waits_for_its_pressure() -> None:

@@ -108,13 +108,18 @@ class Trial:
         off = self.x[sizes] - [members[k].at(0.0) for k in sizes]
         return float(off @ np.linalg.pinv(spread) @ off)
 
-    def with_one_size(self, effect: str, size: str) -> "Trial":
+    def with_sizes(self, effect: str, sizes: Sequence[str]) -> "Trial":
         """Return the trial with the other sizes of an effect at 0, no longer to be fitted."""
-        return self._less([f"effects.{effect}.{s}" for s in REGISTRY[effect].sizes if s != size])
+        others = [size for size in REGISTRY[effect].sizes if size not in sizes]
+        return self._less([f"effects.{effect}.{size}" for size in others])
+
+    def with_one_size(self, effect: str, size: str) -> "Trial":
+        """Return the trial with one size of an effect alone."""
+        return self.with_sizes(effect, [size])
 
     def with_each_size(self, effect: str) -> "list[Trial]":
         """Return the trial with each size of an effect alone, if it has several."""
-        sizes = self._sizes(effect)
+        sizes = self.sizes(effect)
         return [self.with_one_size(effect, s) for s in sizes] if len(sizes) > 1 else []
 
     def with_a_term_less(self, effect: str) -> "Trial | None":
@@ -122,7 +127,7 @@ class Trial:
 
         What else is fitted is where it is most probable then, to first order.
         """
-        sizes = self._sizes(effect)
+        sizes = self.sizes(effect)
         if len(sizes) == 1:
             return None
         path = f"effects.{effect}.{sizes[-1]}"
@@ -131,7 +136,8 @@ class Trial:
         x = self.x - self.x[last] * np.where(np.isfinite(along), along, 0.0)
         return self._less([path]).at(np.delete(np.clip(x, *self.unknowns.bounds), last))
 
-    def _sizes(self, effect: str) -> list[str]:
+    def sizes(self, effect: str) -> list[str]:
+        """Return which sizes of an effect are fitted."""
         paths = [unknown.path for unknown in self.unknowns.members]
         return [s for s in REGISTRY[effect].sizes if f"effects.{effect}.{s}" in paths]
 

@@ -37,7 +37,9 @@ from emir_analysis.diagnosis.select import (
     excess,
     free_run_score,
 )
+from emir_analysis.diagnosis.side_by_side import side_by_side
 from emir_analysis.diagnosis.stick_slip import OFF, Grown, Growths
+from emir_analysis.diagnosis.telling import TWO_DEVIATIONS, between_steps
 from emir_analysis.diagnosis.trial import Trial, moved, with_all_terms
 from emir_analysis.signals import Array
 from emir_common.parameter_tree import declared
@@ -46,6 +48,7 @@ from emir_plant.effects.payload import Payload
 from emir_plant.sheet import Sheet
 
 STEADY = ("sensor_bias", LOAD)  # beside friction as one that differs with the direction
+BEYOND = (1.0, 4.0)  # of the way to the next step, from where what acts in steps is fitted again
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
 # in 99 of 100 recordings
 
@@ -244,6 +247,7 @@ class Whole:
         if not sticks(fitted):
             if _sizes(fitted) not in self._with_fewest:
                 fitted = self._with_fewer_sizes(fitted)
+            fitted = self._past_its_steps(fitted)
         elif breakaway_may_be_none(fitted):
             plain = without_breakaway(fitted, self._sheet)
             smooth = refine_free_run(plain, self._evidence, fitted)
@@ -251,6 +255,31 @@ class Whole:
         fitted = self._with_usual_shares(self._in_usual_form(fitted))
         self.keep(fitted)
         return fitted
+
+    def _past_its_steps(self, fitted: Trial) -> Trial:
+        """Return a trial with fewer sizes of what acts in steps, fitted from beyond these as well.
+
+        Between two steps a fit does its best: other sizes make up for a threshold that is off.
+        """
+        found = self._best_of(fitted, _with_two_sizes(fitted))
+        while (past := self._best_of(found, self._beyond_steps(found))) is not found:
+            found = past
+        return found
+
+    def _best_of(self, fitted: Trial, begun: Sequence[Trial]) -> Trial:
+        """Return a trial, or the best of those fitted from where they are begun if it is better."""
+        again = side_by_side(lambda way: refine_free_run(way, self._evidence), begun)
+        best = min([fitted, *again], key=self.score)
+        return best if self.score(best) < self.score(fitted) - TWO_DEVIATIONS else fitted
+
+    def _beyond_steps(self, fitted: Trial) -> list[Trial]:
+        ways = []
+        for k, unknown in enumerate(fitted.unknowns.members):
+            if unknown.is_stepwise:
+                ends = [unknown.at(x) for x in between_steps(fitted, k, self._evidence)]
+                x = float(fitted.x[k])
+                ways += [moved(fitted.x, [k], [x + s * (end - x)]) for end in ends for s in BEYOND]
+        return [fitted.at(np.clip(x, *fitted.unknowns.bounds)) for x in ways]
 
     def _in_usual_form(self, fitted: Trial) -> Trial:
         """Return a trial with its effects in their usual form, where that explains as well.
@@ -406,6 +435,17 @@ class Whole:
         if VISCOUS not in led.effects or viscous_is_heard(led, self._evidence, self._floor):
             return led
         return refine_free_run(led.without(VISCOUS), self._evidence)
+
+
+def _with_two_sizes(fitted: Trial) -> list[Trial]:
+    """Return trials with two sizes of an effect alone, the first of those that act in steps one."""
+    ways = []
+    for effect in fitted.effects:
+        own = fitted.sizes(effect)
+        for first in REGISTRY[effect].stepwise[:1]:
+            pairs = [(first, size) for size in own if size != first]
+            ways += [fitted.with_sizes(effect, pair) for pair in pairs if len(pairs) > 1]
+    return ways
 
 
 def _sizes(fitted: Trial) -> frozenset[str]:

@@ -78,7 +78,8 @@ class Whole:
                     fitted = self._with_other_shares(self._refined_again(fitted))
                     fitted = self._with_square(fitted)
             fitted = self._held_open(self._with_payload_elsewhere(fitted))
-            self._known[chosen.effects] = self._with_simple_load(self._with_simple_shares(fitted))
+            fitted = self._with_simple_load(self._with_simple_shares(fitted))
+            self._known[chosen.effects] = self._in_usual_form(fitted)
         return self._known[chosen.effects]
 
     def fitted_score(self, chosen: Trial) -> float:
@@ -240,7 +241,7 @@ class Whole:
         """Return a trial with one size of an effect alone where that explains the whole as well.
 
         Or with Coulomb's friction in place of one whose break-away may be none, with a late command
-        in place of sensors that are all equally late, or with what is usual for a form or a share.
+        in place of sensors that are all equally late, or with what is usual for a share.
         Two sizes together may lead to where neither is right, such as a negative compliance.
         """
         fitted = self._with_uneven_friction(self._with_late_command(fitted))
@@ -252,7 +253,7 @@ class Whole:
             plain = without_breakaway(fitted, self._sheet)
             smooth = refine_free_run(plain, self._evidence, fitted)
             fitted = min(smooth, fitted, key=self.score)
-        fitted = self._with_usual_shares(self._in_usual_form(fitted))
+        fitted = self._with_usual_shares(fitted)
         self.keep(fitted)
         return fitted
 

@@ -62,6 +62,7 @@ from emir_plant.sheet import Sheet, joint1
 
 TOLERANCES = {"cylinder.beta": 0.15, "valve.flow_nominal": 0.03}
 FRICTION = {"effects.viscous_friction.coefficient": 1e5}  # N s/m
+BLOCK = "effects.logic_block_fault"
 SHIFT = {"effects.valve_null_offset.offset": 0.03}
 
 
@@ -384,22 +385,52 @@ def test_a_poppet_that_does_not_open_all_the_way_is_found() -> None:
     assert fitted["effects.logic_block_fault.blocked"] == pytest.approx(0.6, abs=0.03)
 
 
-@pytest.mark.parametrize("other", [{"opening": 29.0}, {"hysteresis": 30e5}])
-def test_a_logic_block_that_opens_late_or_shuts_late_is_found(other: dict[str, float]) -> None:
-    """Its spring is too strong besides, so that it shuts and opens again on the way down."""
+def switching(fault: dict[str, float]) -> tuple[Search, Sheet, Evidence]:
+    """Return the search for a logic block that shuts and opens again on the way down."""
     stated = joint1()
     jerks = [-1.0] * 12 + [-0.4] * 16
     command = [0.0] * 40 + ([0.4] * 60 + [0.0] * 30 + jerks * 3 + [0.0] * 30) * 6
+    hidden = {f"{BLOCK}.{name}": size for name, size in fault.items()}
+    run = operated(with_values(stated, hidden), np.array(command), angle=1.1)
+    evidence, sheet = Evidence([run], stated), Sheet(stated, TOLERANCES, {}, ())
+    return Search(evidence, sheet, lambda _: None), sheet, evidence
+
+
+@pytest.mark.parametrize("other", [{"opening": 29.0}, {"hysteresis": 30e5}])
+def test_a_logic_block_that_opens_late_or_shuts_late_is_found(other: dict[str, float]) -> None:
+    """Its spring is too strong besides."""
     sizes = {"threshold": 60e5} | other
-    fault = {f"effects.logic_block_fault.{name}": size for name, size in sizes.items()}
-    run = operated(with_values(stated, fault), np.array(command), angle=1.1)
-    searched = Search(Evidence([run], stated), Sheet(stated, TOLERANCES, {}, ()), lambda _: None)
+    searched, _, _ = switching(sizes)
     found = searched.named(searched.run()[0])
     assert found.effects == ("logic_block_fault",)
     assert found.machine.effects.logic_block_fault.closing == pytest.approx(0.0, abs=0.02)
     for name, size in sizes.items():
         fitted = getattr(found.machine.effects.logic_block_fault, name)
         assert fitted == pytest.approx(size, rel=0.05 if name in other else 0.01), name
+
+
+def test_a_threshold_is_fitted_beyond_the_minima_of_the_pressure_next_to_it() -> None:
+    """Between two of them other sizes make up for it."""
+    searched, sheet, evidence = switching({"threshold": 60e5, "closing": 1.0})
+    begun = trial(sheet, ("logic_block_fault",))
+    own = [k for k, u in enumerate(begun.unknowns.members) if u.path.startswith(BLOCK)]
+    threshold = begun.unknowns.members[own[0]]
+    start = changed(begun.x, own, [threshold.at(61e5), *[0.0] * (len(own) - 1)])
+    near = refine_free_run(begun.at(start), evidence)
+    assert abs(near.machine.effects.logic_block_fault.threshold - 60e5) > 0.3e5
+    found = searched.whole.plainer(near).machine.effects.logic_block_fault
+    assert found.threshold == pytest.approx(60e5, abs=0.1e5)
+    assert found.closing == pytest.approx(1.0, abs=0.02)
+
+
+def test_what_is_not_needed_beside_the_usual_form_goes() -> None:
+    """One edge of a dead zone that is off by twice as much is both beside a null offset."""
+    searched, sheet, evidence = search({"effects.valve_dead_zone_error.error": 0.035})
+    both = trial(sheet, ("valve_null_offset", "valve_dead_zone_error"))
+    unusual = both.formed({"effects.valve_dead_zone_error.edge": -1.0})
+    begun = fit_free_run(fit_balances(unusual, evidence, searched.floor), evidence)
+    assert begun.form != both.form
+    assert needed(searched, begun).effects == ("valve_dead_zone_error",)
 
 
 def test_friction_that_grows_faster_than_the_speed_is_found() -> None:

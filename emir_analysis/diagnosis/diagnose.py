@@ -36,7 +36,7 @@ from emir_plant.sheet import Sheet
 
 SEVERAL = 3  # effects: more likely one thing that none of them is
 # Times the noise: more, and an effect is only like the truth. Not of what sticks, or of a load
-# whose course is told by half seconds.
+# whose course is told by quarters of a second.
 LIKE = 1.5
 FAR_LOUDER = 3.0  # times: a missing force makes the bending no louder than the force balance
 

@@ -69,10 +69,10 @@ def may_be_loaded(known: Trial, evidence: Evidence) -> bool:
         return False
     residuals = evidence.residuals([known.machine])[0]
     left, limit = level(residuals), limits(known.machine, evidence)
-    noise = float(evidence.floor(known.machine)[FORCE])
-    if not quiet(np.where(MOVED, np.nan, left), limit) or left[FORCE] < LOUD * noise:
+    noise, course = float(evidence.floor(known.machine)[FORCE]), residuals[:, FORCE]
+    if not quiet(np.where(MOVED, np.nan, left), limit) or np.std(course) < LOUD * noise:
         return False
-    return foretold(residuals[:, FORCE], evidence, noise) <= FORETOLD
+    return foretold(course, evidence, noise) <= FORETOLD
 
 
 def _may_be_inside(loaded: Trial) -> bool:
@@ -110,9 +110,11 @@ def sizes(known: Trial) -> dict[str, tuple[float, float, str]]:
 def foretold(force: Array, evidence: Evidence, noise: float) -> float:
     """Return the share of a missing force, (w,) N, that the machine's signals foretell.
 
-    In parts of the recording left out: by a function of one of them, or all of them times a
+    Of what changes in it, since a constant is foretold by no signal: pushes of one direction have a
+    mean. In parts of the recording left out: by a function of one signal, or all of them times a
     constant each, the direction of the motion among them. noise: N, which nothing foretells.
     """
+    force = force - np.mean(force)
     signals = evidence.signals()
     del signals["time"]
     velocity = signals["piston_velocity"][1]

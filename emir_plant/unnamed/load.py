@@ -7,7 +7,7 @@ from emir_common.quantity import quantity
 from emir_plant.curve import place_within, value
 from emir_plant.jit import compiled
 
-COURSE = 181  # points: half a second apart in a recording of 90 s
+COURSE = 361  # points: a quarter of a second apart in a recording of 90 s
 TIME = 1  # what the curve runs over
 
 

@@ -24,6 +24,7 @@ from emir_analysis.diagnosis.load_course import (
     may_be_loaded,
 )
 from emir_analysis.diagnosis.result import diagnosis
+from emir_analysis.diagnosis.select import LEFT, beyond, excess
 from emir_analysis.diagnosis.trial import trial
 from emir_common.parameter_tree import with_values
 from emir_plant.linkage import strokes
@@ -46,14 +47,25 @@ def gusts(time: float) -> float:
     )
 
 
+def pushes(time: float) -> float:
+    """Return the force, N, of something on which the boom leans now and then, always from below."""
+    held = ((3.0, 4.0, 900.0), (11.0, 6.0, 1200.0), (20.0, 7.0, 700.0), (33.0, 9.0, 1000.0))
+    edge = 0.2  # s
+    return sum(
+        size * max(min((time - begin) / edge, (begin + length - time) / edge, 1.0), 0.0)
+        for begin, length, size in held
+    )
+
+
 def pushed(
     machine: Machine,
     load: Callable[[float], float] | None,
     friction: recorded.Force | None = None,
     seed: int = 5,
+    seconds: float = SECONDS,
 ) -> Experiment:
     """Return a run of random moves under a load as the sensors show it."""
-    moves = recorded.moves(SECONDS, seed)
+    moves = recorded.moves(seconds, seed)
     truth = recorded.simulate(machine, moves, friction, load=load)
     commands = np.repeat(moves, COMMAND_STEPS)[: STEPS_PER_SAMPLE * (len(truth) - 1)]
     unseen = np.zeros(len(truth)), np.zeros((len(truth), len(OUTPUTS)))
@@ -104,6 +116,17 @@ def test_without_it_the_machine_is_foreseen_where_no_wind_blows(windy: Findings)
 def test_what_was_learned_from_is_judged_with_the_load(windy: Findings) -> None:
     said = judged(windy, windy.evidence.experiments)
     assert said.off(STAGES[-1]) < 1.1
+
+
+def test_pushes_in_one_direction_with_sharp_edges_are_a_load() -> None:
+    """Their mean is foretold by anything, and they leave the noise alone."""
+    stiff = with_values(joint1(), {"geometry.boom_mass": 3000.0, "cylinder.beta": 1.5e9})
+    evidence = Evidence([pushed(stiff, pushes, seconds=2.0 * SECONDS)], stiff)
+    floor = evidence.floor(stiff)
+    known = fit_balances(trial(Sheet(stiff, TOLERANCES, {}, ()), ()), evidence, floor)
+    found = load_course(known, evidence, floor, print)
+    assert found is not None
+    assert excess(found, evidence) < beyond(LEFT)
 
 
 def test_friction_at_a_place_is_no_load() -> None:

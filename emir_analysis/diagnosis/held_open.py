@@ -18,27 +18,20 @@ ABOVE = (0.0, 0.5, 1.0)  # of the hysteresis: where it opens, above the single t
 
 
 def held_open(known: Trial) -> list[Trial]:
-    """Return trials whose logic block shuts below where it opens, with all else as stated or not.
+    """Return trials whose logic block shuts below where it opens, and is as stated in all else.
 
     None without a fault of its threshold, or where it may already.
     """
-    paths = [unknown.path for unknown in known.unknowns.members]
-    if THRESHOLD not in paths or HYSTERESIS in paths:
+    begun = known.with_sizes(BLOCK, ["threshold"])
+    paths = [unknown.path for unknown in begun.unknowns.members]
+    if THRESHOLD not in paths or HYSTERESIS in known.unknowns.values(known.x):
         return []
-    scale = first_tried(BLOCK, "hysteresis", known.machine)
-    begun = known.also(in_proportion(BLOCK, "hysteresis", scale, 0.0))
-    members, at = begun.unknowns.members, paths.index(THRESHOLD)
-    threshold = members[at]
-    others = [
-        k
-        for k, unknown in enumerate(members[:-1])
-        if unknown.path.startswith(f"effects.{BLOCK}.") and k != at
-    ]
-    low, high = begun.unknowns.bounds
-    single = threshold.value(begun.x[at])
-    bases = [begun.x, moved(begun.x, others, [0.0] * len(others))] if others else [begun.x]
+    at, scale = paths.index(THRESHOLD), first_tried(BLOCK, "hysteresis", known.machine)
+    begun = begun.also(in_proportion(BLOCK, "hysteresis", scale, 0.0))
+    threshold, (low, high) = begun.unknowns.members[at], begun.unknowns.bounds
+    single = threshold.value(float(begun.x[at]))
     ways = [
-        moved(base, [at, -1], [threshold.at(single + above * step * scale), step])
-        for base, step, above in product(bases, STEPS, ABOVE)
+        moved(begun.x, [at, -1], [threshold.at(single + above * step * scale), step])
+        for step, above in product(STEPS, ABOVE)
     ]
     return [begun.at(np.clip(x, low, high)) for x in ways]

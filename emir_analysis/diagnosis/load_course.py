@@ -69,10 +69,10 @@ def may_be_loaded(known: Trial, evidence: Evidence) -> bool:
         return False
     residuals = evidence.residuals([known.machine])[0]
     left, limit = level(residuals), limits(known.machine, evidence)
-    noise, course = float(evidence.floor(known.machine)[FORCE]), residuals[:, FORCE]
-    if not quiet(np.where(MOVED, np.nan, left), limit) or np.std(course) < LOUD * noise:
+    noise = float(evidence.floor(known.machine)[FORCE])
+    if not quiet(np.where(MOVED, np.nan, left), limit) or left[FORCE] < LOUD * noise:
         return False
-    return foretold(course, evidence, noise) <= FORETOLD
+    return foretold(residuals[:, FORCE], evidence, noise) <= FORETOLD
 
 
 def _may_be_inside(loaded: Trial) -> bool:

@@ -48,7 +48,6 @@ from emir_plant.effects.payload import Payload
 from emir_plant.sheet import Sheet
 
 STEADY = ("sensor_bias", LOAD)  # beside friction as one that differs with the direction
-BEYOND = (1.0, 4.0)  # of the way to the next step, from where what acts in steps is fitted again
 TERM = 6.6  # squared errors, in units of the noise: a term that tells nothing takes away no more
 # in 99 of 100 recordings
 
@@ -262,10 +261,8 @@ class Whole:
 
         Between two steps a fit does its best: other sizes make up for a threshold that is off.
         """
-        found = self._best_of(fitted, _with_two_sizes(fitted))
-        while (past := self._best_of(found, self._beyond_steps(found))) is not found:
-            found = past
-        return found
+        fewer = self._best_of(fitted, _with_two_sizes(fitted))
+        return self._best_of(fewer, self._beyond_steps(fewer))
 
     def _best_of(self, fitted: Trial, begun: Sequence[Trial]) -> Trial:
         """Return a trial, or the best of those fitted from where they are begun if it is better."""
@@ -274,13 +271,13 @@ class Whole:
         return best if self.score(best) < self.score(fitted) - TWO_DEVIATIONS else fitted
 
     def _beyond_steps(self, fitted: Trial) -> list[Trial]:
-        ways = []
-        for k, unknown in enumerate(fitted.unknowns.members):
-            if unknown.is_stepwise:
-                ends = [unknown.at(x) for x in between_steps(fitted, k, self._evidence)]
-                x = float(fitted.x[k])
-                ways += [moved(fitted.x, [k], [x + s * (end - x)]) for end in ends for s in BEYOND]
-        return [fitted.at(np.clip(x, *fitted.unknowns.bounds)) for x in ways]
+        """Return a trial moved to where what acts in steps acts otherwise, one by one."""
+        return [
+            fitted.at(moved(fitted.x, [k], [unknown.at(end)]))
+            for k, unknown in enumerate(fitted.unknowns.members)
+            if unknown.is_stepwise
+            for end in between_steps(fitted, k, self._evidence)
+        ]
 
     def _in_usual_form(self, fitted: Trial) -> Trial:
         """Return a trial with its effects in their usual form, where that explains as well.

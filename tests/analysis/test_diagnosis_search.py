@@ -409,18 +409,35 @@ def test_a_logic_block_that_opens_late_or_shuts_late_is_found(other: dict[str, f
         assert fitted == pytest.approx(size, rel=0.05 if name in other else 0.01), name
 
 
+def near(switches: tuple[Search, Sheet, Evidence], **sizes: float) -> Trial:
+    """Return a logic block fitted from some sizes, the others as stated."""
+    _, sheet, evidence = switches
+    begun = trial(sheet, ("logic_block_fault",))
+    at = {f"{BLOCK}.{name}": size for name, size in sizes.items()}
+    x = [
+        u.at(at.get(u.path, 0.0)) if u.path.startswith(BLOCK) else x
+        for u, x in zip(begun.unknowns.members, begun.x, strict=True)
+    ]
+    return refine_free_run(begun.at(np.array(x)), evidence)
+
+
 def test_a_threshold_is_fitted_beyond_the_minima_of_the_pressure_next_to_it() -> None:
     """Between two of them other sizes make up for it."""
-    searched, sheet, evidence = switching({"threshold": 60e5, "closing": 1.0})
-    begun = trial(sheet, ("logic_block_fault",))
-    own = [k for k, u in enumerate(begun.unknowns.members) if u.path.startswith(BLOCK)]
-    threshold = begun.unknowns.members[own[0]]
-    start = changed(begun.x, own, [threshold.at(61e5), *[0.0] * (len(own) - 1)])
-    near = refine_free_run(begun.at(start), evidence)
-    assert abs(near.machine.effects.logic_block_fault.threshold - 60e5) > 0.3e5
-    found = searched.whole.plainer(near).machine.effects.logic_block_fault
+    switches = switching({"threshold": 60e5, "closing": 1.0})
+    between = near(switches, threshold=61e5)
+    assert abs(between.machine.effects.logic_block_fault.threshold - 60e5) > 0.3e5
+    found = switches[0].whole.plainer(between).machine.effects.logic_block_fault
     assert found.threshold == pytest.approx(60e5, abs=0.1e5)
     assert found.closing == pytest.approx(1.0, abs=0.02)
+
+
+def test_beside_a_threshold_one_size_is_kept_where_it_says_all() -> None:
+    switches = switching({"threshold": 60e5, "closing": 1.0})
+    astray = near(switches, threshold=59.8e5, closing=0.9, opening=1.0, blocked=0.05)
+    assert astray.machine.effects.logic_block_fault.opening > 0.5
+    found = switches[0].whole.plainer(astray)
+    assert found.sizes("logic_block_fault") == ["threshold", "closing"]
+    assert found.machine.effects.logic_block_fault.closing == pytest.approx(1.0, abs=0.02)
 
 
 def test_what_is_not_needed_beside_the_usual_form_goes() -> None:

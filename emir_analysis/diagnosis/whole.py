@@ -204,10 +204,10 @@ class Whole:
 
     def _held_open(self, fitted: Trial) -> Trial:
         """Return a trial whose logic block shuts below where it opens, where most goes."""
-        ways = held_open(fitted)
-        if not ways or self._excess(fitted) <= beyond(LEFT):
+        begun = held_open(fitted)
+        if begun is None or self._excess(fitted) <= beyond(LEFT):
             return fitted
-        return self._if_most_goes(min(ways, key=self.score), fitted)
+        return self._if_most_goes(begun, fitted)
 
     def _if_most_goes(self, begun: Trial, fitted: Trial) -> Trial:
         """Return a trial fitted from where it is begun, where most of what another leaves goes."""

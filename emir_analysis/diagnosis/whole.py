@@ -75,8 +75,8 @@ class Whole:
                     fitted = self._led_again(fitted)
                 else:
                     fitted = self._with_other_shares(self._refined_again(fitted))
-                    fitted = self._with_square(fitted)
-            fitted = self._held_open(self._with_payload_elsewhere(fitted))
+                    fitted = self._with_more(with_square, fitted)
+            fitted = self._with_more(held_open, self._with_payload_elsewhere(fitted))
             fitted = self._with_simple_load(self._with_simple_shares(fitted))
             self._known[chosen.effects] = self._in_usual_form(fitted)
         return self._known[chosen.effects]
@@ -195,16 +195,12 @@ class Whole:
             return fitted
         return self._if_most_goes(begun, fitted)
 
-    def _with_square(self, fitted: Trial) -> Trial:
-        """Return a trial whose viscous friction grows faster, where that takes most away."""
-        begun = with_square(fitted)
-        if begun is None or self._excess(fitted) <= beyond(LEFT):
-            return fitted
-        return self._if_most_goes(begun, fitted)
+    def _with_more(self, more: Callable[[Trial], Trial | None], fitted: Trial) -> Trial:
+        """Return a trial with what else may be fitted, where that takes most of the rest away.
 
-    def _held_open(self, fitted: Trial) -> Trial:
-        """Return a trial whose logic block shuts below where it opens, where most goes."""
-        begun = held_open(fitted)
+        more: a trial -> one that is begun with it, or None.
+        """
+        begun = more(fitted)
         if begun is None or self._excess(fitted) <= beyond(LEFT):
             return fitted
         return self._if_most_goes(begun, fitted)
@@ -271,7 +267,7 @@ class Whole:
         return best if self.score(best) < self.score(fitted) - TWO_DEVIATIONS else fitted
 
     def _beyond_steps(self, fitted: Trial) -> list[Trial]:
-        """Return a trial moved to where what acts in steps acts otherwise, one by one."""
+        """Return trials, each with one of what acts in steps moved to where it acts otherwise."""
         return [
             fitted.at(moved(fitted.x, [k], [unknown.at(end)]))
             for k, unknown in enumerate(fitted.unknowns.members)
@@ -439,10 +435,10 @@ def _with_two_sizes(fitted: Trial) -> list[Trial]:
     """Return trials with two sizes of an effect alone, the first of those that act in steps one."""
     ways = []
     for effect in fitted.effects:
-        own = fitted.sizes(effect)
-        for first in REGISTRY[effect].stepwise[:1]:
-            pairs = [(first, size) for size in own if size != first]
-            ways += [fitted.with_sizes(effect, pair) for pair in pairs if len(pairs) > 1]
+        first = REGISTRY[effect].stepwise[:1]
+        others = [size for size in fitted.sizes(effect) if size not in first]
+        if first and others[1:]:
+            ways += [fitted.with_sizes(effect, (*first, other)) for other in others]
     return ways
 
 

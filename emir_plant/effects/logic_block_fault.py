@@ -27,7 +27,8 @@ class LogicBlockFault(Effect):
         "hysteresis",
     )
     source: ClassVar[str] = (
-        "spring setting, a sticking or blocked pilot, dirt; magnitudes of a maladjusted valve"
+        "spring setting, a sticking or blocked pilot, dirt, a poppet's area that the pressure"
+        " works on once it has lifted; magnitudes of a maladjusted valve"
     )
     trial: ClassVar[dict[str, float]] = {
         "threshold": 5e5,

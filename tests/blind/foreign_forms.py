@@ -312,8 +312,16 @@ class BlockedPoppet(Hidden):
         return max(1.0 - self.sizes["in_the_way"], 0.05)
 
 
-class SlowToOpen(Hidden):
-    """A logic block with a stiff spring and a narrow pilot line: it shuts, and opens late."""
+class StiffSpring(Hidden):
+    """A logic block that shuts on the way down, as the pressure swings."""
+
+    def changed(self, numbers: Numbers) -> Numbers:
+        n = super().changed(numbers)
+        return Numbers(**{**vars(n), "threshold": self.sizes["opens_at"] * n.threshold})
+
+
+class SlowToOpen(StiffSpring):
+    """And whose pilot line is narrow: it opens late."""
 
     name = "logic_block_fault~slow to open"
     grows = ("opens_in", "opens_at")
@@ -322,18 +330,14 @@ class SlowToOpen(Hidden):
     def draw(cls, random: Random) -> Sizes:
         return {"opens_in": between(random, 0.3, 1.0), "opens_at": between(random, 1.5, 2.5)}
 
-    def changed(self, numbers: Numbers) -> Numbers:
-        n = super().changed(numbers)
-        return Numbers(**{**vars(n), "threshold": self.sizes["opens_at"] * n.threshold})
-
     def logic_rate(self, opened: float, pilot: float) -> float:
         if pilot > self.n.threshold:
             return (1.0 - opened) / self.sizes["opens_in"]
         return super().logic_rate(opened, pilot)
 
 
-class HeldOpen(Hidden):
-    """A logic block whose open poppet is pressed on all over: it shuts later than it opens."""
+class HeldOpen(StiffSpring):
+    """And whose open poppet is pressed on all over: it shuts later than it opens."""
 
     name = "logic_block_fault~held open"
     grows = ("opens_at", "shuts_lower")
@@ -343,9 +347,8 @@ class HeldOpen(Hidden):
         return {"opens_at": between(random, 1.5, 2.5), "shuts_lower": between(random, 0.2, 0.5)}
 
     def logic_rate(self, opened: float, pilot: float) -> float:
-        opens = self.sizes["opens_at"] * self.n.threshold
-        held = opens * self.sizes["shuts_lower"] * opened
-        return super().logic_rate(opened, pilot - opens + held + self.n.threshold)
+        held = self.sizes["shuts_lower"] * self.n.threshold * opened
+        return super().logic_rate(opened, pilot + held)
 
 
 class OtherOil(Hidden):

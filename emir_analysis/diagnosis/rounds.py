@@ -36,6 +36,7 @@ from emir_plant.effects import REGISTRY
 from emir_plant.sheet import Sheet
 
 MOST_FITTED = 4  # effects that are fitted to the balances with all parameters
+MOST_BESIDE = 2  # effects beside which a second one is looked for on the balances
 MOST_SIMULATED = 3  # trials of a round that go on from the balances to the free run
 CLOSE = 5.0 * STRONG  # of the best score on the balances, within which the free run decides
 
@@ -217,15 +218,15 @@ class Rounds:
     def pairs(self, plain: Tried, best: Tried) -> list[Tried]:
         """Return what is better than the best so far with two effects beside parameters alone.
 
-        All to first order, and all beside the one effect that says most to the balances: the
-        free run may be none the better for it while another effect drives it away.
+        All to first order, and all beside the effects that say most to the balances: the free run
+        may be none the better for one while another effect drives it away.
         """
         found = list(self._on_balances(plain.trial).pairs)
         singles = [t for t in self.tried if len(t.trial.effects) == 1]
-        first = min(singles, key=lambda t: t.balances, default=best)
-        if first.trial.effects != best.trial.effects:
-            told = fit_balances(first.trial, self._head, self._floor)
-            found += self._on_balances(told).singles
+        for first in sorted(singles, key=lambda t: t.balances)[:MOST_BESIDE]:
+            if first.trial.effects != best.trial.effects:
+                told = fit_balances(first.trial, self._head, self._floor)
+                found += self._on_balances(told).singles
         return self._by_balances(sorted(found, key=lambda s: s.cost), best)
 
     def triples(self, best: Tried) -> list[Tried]:

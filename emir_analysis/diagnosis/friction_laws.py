@@ -14,9 +14,11 @@ from emir_plant.sheet import Sheet
 
 DRY = ("coulomb_friction", "stribeck_friction", "pressure_dependent_friction")
 COULOMB, STRIBECK, VISCOUS = "coulomb_friction", "stribeck_friction", "viscous_friction"
+BY_LOAD = "pressure_dependent_friction"
 GIVE = 3e-5  # m, way on which seals give before they slide, at which a fit begins: 1e-5 ... 1e-4
 LEAST_GIVE, MOST_GIVE = 5e-6, 3e-3  # m
 DAMPED, MOST_DAMPED = 1e-3, 0.05  # s, by their damping: where a fit begins, and the most
+ELASTIC = 0.8  # share of the friction up to which they spring back, about
 UNEVEN = 0.2  # share by which friction differs with the direction, about
 NEAR = 2.0  # standard deviations, within which a break-away may be none
 
@@ -81,6 +83,13 @@ def along_the_way(known: Trial) -> Trial:
     return known
 
 
+def elastic(known: Trial) -> Trial:
+    """Return a trial whose seals may spring back before they slide, where they give."""
+    for name in _dry(known) if is_along_the_way(known) and not is_elastic(known) else ():
+        known = known.also(Unknown(_elastic(name), "1", 0.0, 1.0, 0.0, 1.0, ELASTIC, False))
+    return known
+
+
 def uneven(known: Trial) -> Trial:
     """Return a trial whose dry friction may differ with the direction of motion.
 
@@ -110,6 +119,12 @@ def is_uneven(known: Trial) -> bool:
 def is_along_the_way(known: Trial) -> bool:
     """Tell whether a trial's dry friction comes along the way."""
     return any(getattr(known.machine.effects, name).presliding for name in _dry(known))
+
+
+def is_elastic(known: Trial) -> bool:
+    """Tell whether a trial's seals may spring back before they slide."""
+    paths = {unknown.path for unknown in known.unknowns.members}
+    return any(_elastic(name) in paths for name in _dry(known))
 
 
 def is_gradual(known: Trial) -> bool:
@@ -174,6 +189,8 @@ def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
     found = found.fixed(_share(COULOMB), full.machine.effects.stribeck_friction.gradual_share)
     if is_along_the_way(full):
         found = along_the_way(found)
+    if is_elastic(full):
+        found = elastic(found)
     if _asymmetry(STRIBECK) in values:
         found = _uneven(found, COULOMB)
     x = found.x.copy()
@@ -185,6 +202,10 @@ def without_breakaway(full: Trial, sheet: Sheet) -> Trial:
 
 def _share(effect: str) -> str:
     return f"effects.{effect}.gradual_share"
+
+
+def _elastic(effect: str) -> str:
+    return f"effects.{effect}.elastic_share"
 
 
 def _asymmetry(effect: str) -> str:

@@ -21,8 +21,10 @@ from emir_analysis.diagnosis.friction_laws import (
     COULOMB,
     STRIBECK,
     VISCOUS,
+    elastic,
     gradual,
     is_along_the_way,
+    is_elastic,
     is_gradual,
     is_uneven,
     uneven,
@@ -90,13 +92,18 @@ def _best(found: Sequence[Laws], begins: Sequence[Evidence], most: float) -> Fit
 
 
 def _other_laws(laws: Laws, evidence: Evidence) -> list[Laws]:
-    """Return fuller laws, the same one come gradually, where it comes by tanh, and uneven."""
+    """Return fuller laws, the same one come otherwise, and uneven.
+
+    Gradually, where it comes by tanh; from seals that spring back, where it comes along the way.
+    """
     law, fuller = laws
     found = _fuller(laws)
     if not is_uneven(law):
         found.append(Laws(uneven(law), [uneven(more) for more in fuller]))
     if not is_along_the_way(law) and not is_gradual(law):
         found.append(Laws(gradually(law, evidence), [gradual(more) for more in fuller]))
+    if is_along_the_way(law) and not is_elastic(law):
+        found.append(Laws(elastic(law), [elastic(more) for more in fuller]))
     return found
 
 

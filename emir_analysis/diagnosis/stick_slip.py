@@ -14,7 +14,7 @@ import numpy as np
 from emir_analysis.diagnosis.evidence import Evidence
 from emir_analysis.diagnosis.fit import Problem, Solution, descended, fit
 from emir_analysis.diagnosis.fitting import free_run_problem, refine_free_run
-from emir_analysis.diagnosis.friction_laws import is_along_the_way, is_gradual
+from emir_analysis.diagnosis.friction_laws import is_along_the_way, is_elastic, is_gradual
 from emir_analysis.diagnosis.run_errors import FREE_RUN_ACCURACY, weight_of_noise
 from emir_analysis.diagnosis.select import AT_NOISE, LEFT
 from emir_analysis.diagnosis.trial import Trial
@@ -41,7 +41,7 @@ ROUGH_ACCURACY = 1e-2  # to go on from, or where only whether half of the rest i
 
 Method = Callable[[Problem, float], Solution]
 Limit = Callable[[Evidence], float]
-Law = tuple[tuple[str, ...], bool, bool]  # effects, gradual, along the way
+Law = tuple[tuple[str, ...], bool, bool, bool]  # effects, gradual, along the way, elastic
 
 
 def _anything(_: Evidence) -> float:
@@ -117,7 +117,7 @@ class Growths:
         x, part = from_rest(known, self._evidence), self._evidence.until(DECIDED)
         first = fitted_to(known, part, x, FREE_RUN_ACCURACY, descended)
         led = Led(first, DECIDED, first, DECIDED)
-        law = known.effects, is_gradual(known), is_along_the_way(known)
+        law = known.effects, is_gradual(known), is_along_the_way(known), is_elastic(known)
         if law in self._before:
             before, ended, grown = self._before[law]
             if first.misfit * CLEARLY > before.misfit:

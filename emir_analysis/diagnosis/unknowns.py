@@ -192,7 +192,7 @@ def first_tried(effect: str, name: str, machine: Machine) -> float:
     kind = REGISTRY[effect]
     about = quantities(kind)[name]
     value = float(kind.trial.get(name, getattr(kind(), name)))
-    return min(value * proportion(about.unit, machine), about.high)
+    return min(value * proportion(about.unit, machine), about.high) if name in kind.sizes else value
 
 
 def in_proportion(effect: str, name: str, scale: float, start: float) -> Unknown:

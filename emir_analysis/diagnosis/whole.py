@@ -5,12 +5,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from emir_analysis.diagnosis.evidence import Evidence
-from emir_analysis.diagnosis.fitting import glimpsed, refine_free_run, with_fewer_terms
+from emir_analysis.diagnosis.fitting import (
+    following,
+    glimpsed,
+    refine_free_run,
+    with_fewer_terms,
+)
 from emir_analysis.diagnosis.friction_beginning import follows_the_beginning, gradually
 from emir_analysis.diagnosis.friction_laws import (
+    BY_LOAD,
     VISCOUS,
     along_the_way,
     breakaway_may_be_none,
+    elastic,
     gradual,
     is_along_the_way,
     is_gradual,
@@ -72,7 +79,7 @@ class Whole:
             if beyond(LEFT) < self._excess(fitted) < beyond(HOPELESS):
                 fitted = self._with_fewer_sizes(fitted)
                 if sticks(fitted):
-                    fitted = self._led_again(fitted)
+                    fitted = self._with_seals_that_give(self._led_again(fitted))
                 else:
                     fitted = self._with_other_shares(self._refined_again(fitted))
                     fitted = self._with_more(with_square, fitted)
@@ -126,6 +133,20 @@ class Whole:
         Over all of a recording at once a fit ends close to where it began.
         """
         return min(fitted, self._growths.grown(fitted).trial, key=self.score)
+
+    def _with_seals_that_give(self, fitted: Trial) -> Trial:
+        """Return a trial whose friction under load comes along the way, if that is better.
+
+        Other friction is asked so over a beginning, which tells its law.
+        """
+        if BY_LOAD not in fitted.effects:
+            return fitted
+        best, giving = fitted, along_the_way(fitted)
+        for law in (giving, elastic(giving)):
+            if self._excess(best) > beyond(LEFT):
+                led = following(law, self._evidence)
+                best = min(best, refine_free_run(led, self._evidence, best), key=self.score)
+        return best
 
     def _with_fewer_sizes(self, full: Trial) -> Trial:
         """Return a trial with one size of its effects alone where that is better than with all.

@@ -33,9 +33,9 @@ class Backlash(Effect):
     trial: ClassVar[dict[str, float]] = {"gap": 5e-4, "gradual_share": 0.5, "pin_force": 5e6}
 
     gap: float = quantity("m", 0.0, 1e-2, "from flank to flank", default=0.0)
-    seating_force: float = quantity("N", 5.0, 1e6, "F_s, at which a flank is met", default=2e4)
+    seating_force: float = quantity("N", 200.0, 1e6, "F_s, at which a flank is met", default=2e4)
     gradual_share: float = quantity("1", 0.0, 1.0, "of F/sqrt(F^2 + F_s^2)", default=0.0)
-    crossing_time: float = quantity("s", 1e-4, 0.5, "T, of the film in the bearing", default=0.01)
+    crossing_time: float = quantity("s", 0.002, 0.5, "T, of the film in the bearing", default=0.01)
     pin_force: float = quantity("N", 1e4, 1e12, "F_p, bends the pin by gap / 2", default=1e12)
 
 

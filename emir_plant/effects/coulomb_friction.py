@@ -23,7 +23,7 @@ class CoulombFriction(Effect):
     source: ClassVar[str] = "seal friction, 1-3 % of the load"
     trial: ClassVar[dict[str, float]] = {"force": 3e3, "gradual_share": 0.5}
     given: ClassVar[tuple[str, ...]] = ("asymmetry",)
-    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
+    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time", "elastic_share")
 
     force: float = quantity("N", 0.0, 1e5, "F_c", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=1e-3)
@@ -35,6 +35,9 @@ class CoulombFriction(Effect):
         "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
     )
     presliding_time: float = quantity("s", 0.0, 0.1, "sigma_1 / sigma_0 on that way", default=0.0)
+    elastic_share: float = quantity(
+        "1", 0.0, 1.0, "of the friction, up to which they spring back", default=0.0
+    )
 
 
 @compiled

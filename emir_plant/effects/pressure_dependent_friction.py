@@ -28,7 +28,7 @@ class PressureDependentFriction(Effect):
         "seal_share": 0.5,
     }
     given: ClassVar[tuple[str, ...]] = ("asymmetry",)
-    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
+    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time", "elastic_share")
 
     coefficient: float = quantity("1", 0.0, 0.2, "mu", default=0.0)
     smoothing_speed: float = quantity("m/s", 1e-5, 1e-2, "v_0", default=2e-3)
@@ -41,6 +41,9 @@ class PressureDependentFriction(Effect):
         "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
     )
     presliding_time: float = quantity("s", 0.0, 0.1, "sigma_1 / sigma_0 on that way", default=0.0)
+    elastic_share: float = quantity(
+        "1", 0.0, 1.0, "of the friction, up to which they spring back", default=0.0
+    )
 
 
 @compiled

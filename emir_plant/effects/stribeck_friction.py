@@ -29,7 +29,7 @@ class StribeckFriction(Effect):
         "gradual_share": 0.5,
     }
     given: ClassVar[tuple[str, ...]] = ("asymmetry",)
-    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time")
+    other_law: ClassVar[tuple[str, ...]] = ("presliding", "presliding_time", "elastic_share")
 
     force: float = quantity("N", 0.0, 1e5, "F_c, while sliding fast", default=0.0)
     breakaway: float = quantity("1", 1.0, 5.0, "F_s / F_c", default=1.3)
@@ -43,6 +43,9 @@ class StribeckFriction(Effect):
         "m", 0.0, 1e-2, "way on which the seals give before they slide; 0: by velocity", default=0.0
     )
     presliding_time: float = quantity("s", 0.0, 0.1, "sigma_1 / sigma_0 on that way", default=0.0)
+    elastic_share: float = quantity(
+        "1", 0.0, 1.0, "of the friction, up to which they spring back", default=0.0
+    )
 
 
 @compiled

@@ -86,12 +86,16 @@ def bristles(velocity: float, pressing: float, p: Any) -> Bristles:
     damping = coulomb * p.coulomb_friction_presliding_time
     damping += stribeck * p.stribeck_friction_presliding_time
     damping += by_load * p.pressure_dependent_friction_presliding_time
+    elastic = coulomb * p.coulomb_friction_elastic_share
+    elastic += stribeck * p.stribeck_friction_elastic_share
+    elastic += by_load * p.pressure_dependent_friction_elastic_share
     sliding = p.coulomb_friction_force * by_direction(velocity, p.coulomb_friction_asymmetry)
     sliding += pressed * by_direction(velocity, p.pressure_dependent_friction_asymmetry)
     if p.stribeck_friction_force > 0.0:
         level = stribeck_friction.level(velocity, p)
         sliding += level * by_direction(velocity, p.stribeck_friction_asymmetry)
-    return Bristles(sliding, coulomb + stribeck + by_load, damping)
+    stiffness = coulomb + stribeck + by_load
+    return Bristles(sliding, stiffness, damping, _over(elastic, stiffness))
 
 
 @compiled

@@ -909,6 +909,34 @@ def test_a_third_effect_is_looked_for_where_no_two_bring_the_free_run_nearer() -
     assert {"payload", "internal_leakage", "valve_null_offset"} in found
 
 
+def test_a_second_effect_is_looked_for_beside_the_two_that_say_most_to_the_balances(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Soft oil says most of a leak that pulls behind play of the spool; beside the play it shows.
+
+    To first order, beside none, the leak does not.
+    """
+    searched, sheet, evidence = search(
+        {"effects.external_leakage.lifting": 3e-12, "effects.valve_hysteresis.width": 0.05}
+    )
+    rounds, plain = searched._rounds, searched._rounds.scored(searched.balanced)
+    told = [("vessel_compliance", 1.0), ("valve_hysteresis", 2.0), ("payload", 3.0)]
+    for name, score in told:
+        single = fit_balances(trial(sheet, (name,)), evidence, searched.floor)
+        rounds.tried.append(Tried(single, score))
+    asked: list[tuple[str, ...]] = []
+
+    def noted(found: list[Screened], _: Tried) -> list[Tried]:
+        asked.extend(each.trial.effects for each in found)
+        return []
+
+    monkeypatch.setattr(rounds, "_by_balances", noted)
+    rounds.pairs(plain, plain)
+    beside = {first for first, *_ in asked}
+    assert ("valve_hysteresis", "external_leakage") in asked
+    assert ("payload", "external_leakage") not in asked, beside
+
+
 def test_a_third_effect_is_found_beside_a_pair_that_alone_helps() -> None:
     """The first effect leads nowhere near, and the pair does not suffice."""
     hidden = {

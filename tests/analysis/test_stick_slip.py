@@ -128,6 +128,26 @@ def test_seals_that_give_before_they_slide_are_found() -> None:
     assert stribeck.presliding_time == pytest.approx(1.5e-3, rel=0.3)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.8], ids=["creep", "elastic"])
+def test_friction_under_load_of_seals_that_give_is_found(share: float) -> None:
+    """By the velocity it leaves more than the noise, which no beginning of other friction tells."""
+    by_load = "effects.pressure_dependent_friction."
+    hidden = {
+        by_load + "coefficient": 0.03,
+        by_load + "presliding": 1.5e-4,
+        by_load + "elastic_share": share,
+    }
+    searched, sheet, evidence = search(hidden)
+    start = fit_balances(trial(sheet, ("pressure_dependent_friction",)), evidence, searched.floor)
+    found = searched.whole.fitted(start)
+    friction = found.machine.effects.pressure_dependent_friction
+    assert friction.coefficient == pytest.approx(0.03, rel=0.03)
+    assert friction.presliding == pytest.approx(1.5e-4, rel=0.05)
+    assert friction.elastic_share == pytest.approx(share, abs=0.05)
+    errors = np.concatenate(free_run_errors(found.machine, evidence))
+    assert np.sqrt(np.mean(errors**2)) < 1.03
+
+
 @pytest.mark.parametrize("asked", [lambda law: law, uneven], ids=["even", "uneven"])
 def test_no_more_friction_stays_than_there_is(asked: Callable[[Trial], Trial]) -> None:
     """A machine with Coulomb friction alone."""

@@ -507,12 +507,20 @@ class _OnBristles(Hidden):
         """Return that of the bristles, N/m."""
         raise NotImplementedError
 
+    def slides_with(self, bent: float) -> float:
+        """Return the share of the seals that slides, bent by a share of the furthest.
+
+        bent: above 0 the way that the piston moves.
+        """
+        return 1.0
+
     def _bending(self, x: Array) -> tuple[float, float]:
         angle, _, spin = self._rows @ x[self.modes]
         velocity = self.lever_arm(angle) * spin
         bent = 1e-5 * x[self._bristle]
         furthest = self.slides_at(velocity, x) / self.stiffness_of_seals(x)
-        return bent, velocity - abs(velocity) * bent / furthest
+        slides = self.slides_with(math.copysign(bent, bent * velocity) / furthest)
+        return bent, velocity - slides * abs(velocity) * bent / furthest
 
     def remembered_rates(self, time: float, x: list[float], now: dict[str, float]) -> list[float]:
         _, rate = self._bending(np.array(x))
@@ -573,6 +581,35 @@ class LoadOnBristles(_OnBristles):
 
     def stiffness_of_seals(self, x: Array) -> float:
         return self.slides_at(0.0, x) / self.sizes["gives"]
+
+
+class ElasticBristles(_OnBristles):
+    """Seals that spring back before they slide: elastoplastic, by Dupont et al. (2002)."""
+
+    name = "coulomb_friction~elastic bristles"
+    grows = ("slides",)
+    scales: ClassVar[dict[str, Scale]] = {"slides": lifting_force}
+
+    @classmethod
+    def draw(cls, random: Random) -> Sizes:
+        return {
+            "slides": between(random, 4e3, 1.5e4),
+            "gives": between(random, 3e-5, 2e-4),
+            "springs_to": random.uniform(0.5, 0.8),
+            "slides_from": random.uniform(0.9, 1.0),
+            "bristle_time": 0.0,
+        }
+
+    def slides_at(self, velocity: float, x: Array) -> float:
+        return self.sizes["slides"]
+
+    def stiffness_of_seals(self, x: Array) -> float:
+        return self.sizes["slides"] / self.sizes["gives"]
+
+    def slides_with(self, bent: float) -> float:
+        low, high = self.sizes["springs_to"], self.sizes["slides_from"]
+        passed = (min(max(bent, low), high) - low) / (high - low)
+        return 0.5 - 0.5 * math.cos(math.pi * passed)
 
 
 class PressedSeals(Hidden):
@@ -655,6 +692,7 @@ FOREIGN: tuple[type[Hidden], ...] = (
     LaggingCommand,
     StribeckOnBristles,
     LoadOnBristles,
+    ElasticBristles,
     PressedSeals,
     UnevenFriction,
     NarrowGap,

@@ -297,6 +297,16 @@ FORMS: dict[type[Hidden], tuple[dict[str, float], dict[str, float]]] = {
         {"rubs": 0.03, "gives": 5e-5, "bristle_time": 0.0},
         {"coefficient": 0.03, "presliding": 5e-5},
     ),
+    _OTHER["coulomb_friction~elastic bristles"]: (  # a step in the middle of his transition
+        {
+            "slides": 2e4,
+            "gives": 2e-4,
+            "springs_to": 0.75,
+            "slides_from": 0.85,
+            "bristle_time": 0.0,
+        },
+        {"force": 2e4, "presliding": 2e-4, "elastic_share": 0.8},
+    ),
     _OTHER["pressure_dependent_friction~seals"]: (
         {"seals_rub": 0.03, "rubs_from": 1e-3},
         {"coefficient": 0.03, "smoothing_speed": 1e-3, "gradual_share": 1.0, "seal_share": 1.0},

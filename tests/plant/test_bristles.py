@@ -20,41 +20,66 @@ STATED = data("joint1.yaml")
 
 FORTY_FIVE = math.radians(45.0)
 STROKE = Truth._fields.index("stroke")
-SEALS = Bristles(2e4, 5e8, 0.0)
+SEALS = Bristles(2e4, 5e8, 0.0, 0.0)
+ELASTIC = SEALS._replace(elastic=0.7)
+BOTH = pytest.mark.parametrize("seals", [SEALS, ELASTIC], ids=["creep", "elastic"])
 
 
 def _on_bristles(effect: str = "coulomb_friction", **fields: float) -> Plant:
     return Plant(with_values(joint1(), {f"effects.{effect}.{k}": v for k, v in fields.items()}))
 
 
-def test_bristles_are_a_spring_at_first_and_slide_far_on() -> None:
-    assert bristles.carried(0.0, 1e-8, SEALS) == pytest.approx(5e8 * 1e-8, rel=1e-3)
-    assert bristles.carried(0.0, 1e-2, SEALS) == pytest.approx(2e4)
-    assert bristles.carried(2e4, -1e-2, SEALS) == pytest.approx(-2e4)
+@BOTH
+def test_bristles_are_a_spring_at_first_and_slide_far_on(seals: Bristles) -> None:
+    assert bristles.carried(0.0, 1e-8, seals) == pytest.approx(5e8 * 1e-8, rel=1e-3)
+    assert bristles.carried(0.0, 1e-2, seals) == pytest.approx(2e4)
+    assert bristles.carried(2e4, -1e-2, seals) == pytest.approx(-2e4)
+
+
+def test_elastic_bristles_do_not_creep_under_a_force_that_comes_and_goes() -> None:
+    """From 0.1 to 0.6 of what they slide at, elastic to 0.7: each way leads back to its start.
+
+    What drifts so is the known fault of the others (Dupont et al. 2002).
+    """
+    way = 0.5 * SEALS.sliding / SEALS.stiffness
+    ends = {}
+    for seals in (SEALS, ELASTIC):
+        force = 0.1 * seals.sliding
+        for _ in range(10):
+            force = bristles.carried(bristles.carried(force, way, seals), -way, seals)
+        ends[seals] = force / seals.sliding
+    assert ends[ELASTIC] == pytest.approx(0.1)
+    assert ends[SEALS] < 0.0
 
 
 @pytest.mark.parametrize("force", [-1.5e4, 0.0, 1.9e4])
 @pytest.mark.parametrize("velocity", [-0.02, 0.003])
-def test_along_the_way_is_what_the_rate_says(force: float, velocity: float) -> None:
+@BOTH
+def test_along_the_way_is_what_the_rate_says(
+    seals: Bristles, force: float, velocity: float
+) -> None:
     """A way in two goes is the same as in one, and its start is the rate's."""
-    half = bristles.carried(force, 5e-4 * velocity, SEALS)
-    whole = bristles.carried(force, 1e-3 * velocity, SEALS)
-    assert bristles.carried(half, 5e-4 * velocity, SEALS) == pytest.approx(whole)
-    short = bristles.carried(force, 1e-6 * velocity, SEALS)
-    rate = SEALS.stiffness * bristles.bending(force, velocity, SEALS)
+    half = bristles.carried(force, 5e-4 * velocity, seals)
+    whole = bristles.carried(force, 1e-3 * velocity, seals)
+    assert bristles.carried(half, 5e-4 * velocity, seals) == pytest.approx(whole)
+    short = bristles.carried(force, 1e-6 * velocity, seals)
+    rate = seals.stiffness * bristles.bending(force, velocity, seals)
     assert (short - force) / 1e-6 == pytest.approx(rate, rel=2e-3)
 
 
-def test_a_way_there_and_back_takes_work() -> None:
+@BOTH
+def test_a_way_there_and_back_takes_work(seals: Bristles) -> None:
     """Second law: no cycle of the piston gives any back, however short."""
     for reach in (1e-6, 4e-5, 1e-3):
         way = reach * np.sin(np.linspace(0.0, 4.0 * math.pi, 20001))
         forces = [0.0]
         for moved in np.diff(way):
-            forces.append(bristles.carried(forces[-1], float(moved), SEALS))
+            forces.append(bristles.carried(forces[-1], float(moved), seals))
         middle = 0.5 * (np.array(forces[1:]) + forces[:-1])
         second = len(middle) // 2  # settled
-        assert middle[second:] @ np.diff(way)[second:] > 0.0
+        work = middle[second:] @ np.diff(way)[second:]
+        springs = seals is ELASTIC and reach < 0.7 * seals.sliding / seals.stiffness
+        assert work == pytest.approx(0.0, abs=1e-9) if springs else work > 0.0
 
 
 def test_a_held_piston_gives_no_further_than_its_seals_do() -> None:

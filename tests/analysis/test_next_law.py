@@ -125,6 +125,7 @@ def test_seals_that_spring_back_are_asked_about_where_they_give() -> None:
     assert friction.presliding == pytest.approx(1.5e-4, rel=0.05)
     assert friction.force == pytest.approx(2e4, rel=0.03)
     assert is_elastic(fuller)
+    assert is_elastic(without_breakaway(fuller, sheet))
 
 
 def test_a_break_away_and_an_effect_are_found_that_explain_only_together() -> None:

@@ -23,6 +23,8 @@ from emir_analysis.diagnosis.friction_beginning import (
     with_less_friction,
 )
 from emir_analysis.diagnosis.friction_laws import (
+    along_the_way,
+    elastic,
     fullest,
     gradual,
     is_along_the_way,
@@ -318,6 +320,23 @@ def test_a_law_is_led_to_the_whole_once(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(led) == 2
     assert Growths(evidence).at_noise(law) is None
     assert len(led) == 2
+
+
+def test_a_law_of_seals_that_spring_back_is_led_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, sheet, evidence = search({})
+    giving = along_the_way(fullest(trial(sheet, ()), sheet))
+    laws, led = [giving, elastic(giving)], []
+
+    def lead(law: Trial, *_: object) -> Led:
+        led.append(law)
+        return Led(at(law, 1.3), 12.0, at(law, 1.0), 10.0)
+
+    monkeypatch.setattr(stick_slip, "fitted_to", lambda law, *_: at(law, 1.05))
+    monkeypatch.setattr(stick_slip, "led_on", lead)
+    growths = Growths(evidence)
+    found = [growths.followed(law).trial.x.size for law in laws]
+    assert led == laws
+    assert found == [law.x.size for law in laws]
 
 
 def test_a_law_that_was_given_up_is_led_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from emir_common.quantity import ParameterError
 from emir_plant import bristles, core
 from emir_plant.bristles import Bristles
 from emir_plant.core import Truth
+from emir_plant.effects import terms
 from emir_plant.plant import Plant
 from emir_plant.robot.actuators import machines
 from emir_plant.robot.sheet import robot
@@ -34,6 +35,19 @@ def test_bristles_are_a_spring_at_first_and_slide_far_on(seals: Bristles) -> Non
     assert bristles.carried(0.0, 1e-8, seals) == pytest.approx(5e8 * 1e-8, rel=1e-3)
     assert bristles.carried(0.0, 1e-2, seals) == pytest.approx(2e4)
     assert bristles.carried(2e4, -1e-2, seals) == pytest.approx(-2e4)
+
+
+@pytest.mark.parametrize(
+    ("effect", "size"),
+    [
+        ("coulomb_friction", {"force": 1e4}),
+        ("stribeck_friction", {"force": 1e4}),
+        ("pressure_dependent_friction", {"coefficient": 0.03}),
+    ],
+)
+def test_all_seals_may_be_elastic(effect: str, size: dict[str, float]) -> None:
+    plant = _on_bristles(effect, **size, presliding=1e-4, elastic_share=0.7)
+    assert terms.bristles(0.1, 3e5, plant.record[0]).elastic == pytest.approx(0.7)
 
 
 def test_elastic_bristles_do_not_creep_under_a_force_that_comes_and_goes() -> None:

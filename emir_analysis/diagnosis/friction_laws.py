@@ -69,11 +69,11 @@ def along_the_way(known: Trial) -> Trial:
     """Return a trial whose dry friction comes along the way in place of with the velocity.
 
     The velocity at which it would turn round stays as it is. The balances go by that: no resolver
-    shows so short a way.
+    shows so short a way. The same where all of it comes so already.
     """
     low, high = math.log(LEAST_GIVE / GIVE), math.log(MOST_GIVE / GIVE)
     most = MOST_DAMPED / DAMPED
-    for name in _dry(known):
+    for name in [name for name in _dry(known) if not _gives(known, name)]:
         smoothing = f"effects.{name}.smoothing_speed"
         speed = declared(known.machine)[smoothing][1]
         known = known.fixed(smoothing, speed).fixed(_share(name), 0.0)
@@ -84,9 +84,13 @@ def along_the_way(known: Trial) -> Trial:
 
 
 def elastic(known: Trial) -> Trial:
-    """Return a trial whose seals may spring back before they slide, where they give."""
-    for name in _dry(known) if is_along_the_way(known) and not is_elastic(known) else ():
-        known = known.also(Unknown(_elastic(name), "1", 0.0, 1.0, 0.0, 1.0, ELASTIC, False))
+    """Return a trial whose seals may spring back before they slide, where they give.
+
+    The same where all that give may already.
+    """
+    for name in [name for name in _dry(known) if _gives(known, name)]:
+        if not _springs(known, name):
+            known = known.also(Unknown(_elastic(name), "1", 0.0, 1.0, 0.0, 1.0, ELASTIC, False))
     return known
 
 
@@ -118,13 +122,12 @@ def is_uneven(known: Trial) -> bool:
 
 def is_along_the_way(known: Trial) -> bool:
     """Tell whether a trial's dry friction comes along the way."""
-    return any(getattr(known.machine.effects, name).presliding for name in _dry(known))
+    return any(_gives(known, name) for name in _dry(known))
 
 
 def is_elastic(known: Trial) -> bool:
     """Tell whether a trial's seals may spring back before they slide."""
-    paths = {unknown.path for unknown in known.unknowns.members}
-    return any(_elastic(name) in paths for name in _dry(known))
+    return any(_springs(known, name) for name in _dry(known))
 
 
 def is_gradual(known: Trial) -> bool:
@@ -135,6 +138,16 @@ def is_gradual(known: Trial) -> bool:
 
 def _dry(known: Trial) -> list[str]:
     return [name for name in known.effects if name in DRY]
+
+
+def _gives(known: Trial, name: str) -> bool:
+    """Tell whether a dry friction comes along the way."""
+    return bool(getattr(known.machine.effects, name).presliding > 0.0)
+
+
+def _springs(known: Trial, name: str) -> bool:
+    """Tell whether a dry friction's seals may spring back before they slide."""
+    return any(unknown.path == _elastic(name) for unknown in known.unknowns.members)
 
 
 def simpler(full: Trial, sheet: Sheet) -> list[Trial]:

@@ -137,13 +137,13 @@ class Whole:
     def _with_seals_that_give(self, fitted: Trial) -> Trial:
         """Return a trial whose friction under load comes along the way, if that is better.
 
-        Other friction is asked so over a beginning, which tells its law.
+        If not already; other friction is asked so over a beginning, which tells its law.
         """
         if BY_LOAD not in fitted.effects:
             return fitted
         best, giving = fitted, along_the_way(fitted)
         for law in (giving, elastic(giving)):
-            if self._excess(best) > beyond(LEFT):
+            if law is not fitted and self._excess(best) > beyond(LEFT):
                 led = following(law, self._evidence)
                 best = min(best, refine_free_run(led, self._evidence, best), key=self.score)
         return best

@@ -78,6 +78,7 @@ def bristles(velocity: float, pressing: float, p: Any) -> Bristles:
     """Return the bristles of all seals; as for `friction`.
 
     Each is as stiff as makes its friction, while sliding fast, over the way on which it gives.
+    Together they are elastic up to the mean of their shares, each counted by its stiffness.
     """
     pressed = p.pressure_dependent_friction_coefficient * abs(pressing)
     coulomb = _over(p.coulomb_friction_force, p.coulomb_friction_presliding)

@@ -150,6 +150,26 @@ def test_friction_under_load_of_seals_that_give_is_found(share: float) -> None:
     assert np.sqrt(np.mean(errors**2)) < 1.03
 
 
+def test_a_law_of_seals_has_each_of_its_numbers_once() -> None:
+    """Also where another dry friction is added, or it is asked for again."""
+    _, sheet, _ = search({})
+    coulomb = elastic(along_the_way(trial(sheet, ("coulomb_friction",))))
+    both = trial(sheet, ("coulomb_friction", "pressure_dependent_friction"), coulomb)
+    for again in (both, elastic(along_the_way(both))):
+        law = elastic(along_the_way(again))
+        paths = [unknown.path for unknown in law.unknowns.members]
+        assert len(paths) == len(set(paths))
+        for name in both.effects:
+            assert {f"effects.{name}.presliding", f"effects.{name}.elastic_share"} <= set(paths)
+
+
+def test_seals_that_give_already_are_not_led_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched, sheet, _ = search({"effects.pressure_dependent_friction.coefficient": 0.03})
+    law = elastic(along_the_way(trial(sheet, ("pressure_dependent_friction",))))
+    monkeypatch.setattr(whole_module, "following", None)
+    assert searched.whole._with_seals_that_give(law) is law
+
+
 @pytest.mark.parametrize("asked", [lambda law: law, uneven], ids=["even", "uneven"])
 def test_no_more_friction_stays_than_there_is(asked: Callable[[Trial], Trial]) -> None:
     """A machine with Coulomb friction alone."""

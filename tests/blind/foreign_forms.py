@@ -505,7 +505,7 @@ class _OnBristles(Hidden):
 
     def stiffness_of_seals(self, x: Array) -> float:
         """Return that of the bristles, N/m."""
-        raise NotImplementedError
+        return self.sizes["slides"] / self.sizes["gives"]
 
     def slides_with(self, bent: float) -> float:
         """Return the share of the seals that slides, bent by a share of the furthest.
@@ -557,9 +557,6 @@ class StribeckOnBristles(_OnBristles):
         hump = (s["breaks_away"] - 1.0) * math.exp(-((velocity / s["falls_at"]) ** 2))
         return s["slides"] * (1.0 + hump)
 
-    def stiffness_of_seals(self, x: Array) -> float:
-        return self.sizes["slides"] / self.sizes["gives"]
-
 
 class LoadOnBristles(_OnBristles):
     """Friction by the load, of seals that give."""
@@ -602,9 +599,6 @@ class ElasticBristles(_OnBristles):
 
     def slides_at(self, velocity: float, x: Array) -> float:
         return self.sizes["slides"]
-
-    def stiffness_of_seals(self, x: Array) -> float:
-        return self.sizes["slides"] / self.sizes["gives"]
 
     def slides_with(self, bent: float) -> float:
         low, high = self.sizes["springs_to"], self.sizes["slides_from"]
